@@ -58,6 +58,10 @@ class FramePainter {
     // Throws as read_textures(), and then draws as before. Precondition: no frame is begun and not finished.
     void set_scene(const Scene& scene, bool same_layers);
 
+    // Returns the camera with which a frame of a time is drawn: without a path, its heights those of the world. Any thread
+    // may call it while another draws.
+    Camera camera(double time_s) const { return painter_.camera(scene_.render, time_s); }
+
     const Renderer& renderer() const { return renderer_; }
     // Return what Renderer's do. They never change: any thread may call these three while another draws.
     std::string backend_name() const { return renderer_.backend_name(); }

@@ -21,10 +21,11 @@ namespace nephos {
 FrameWriter::FrameWriter(const Scene& scene, RunFolder folder, int first_frame)
     : scene_(with_files(scene)), folder_(std::move(folder)), scene_hash_(scene_hash(scene)), first_frame_(first_frame) {}
 
-// The camera at the frame's time, with the exposure that the frame has.
-RenderOptions FrameWriter::exposed_options(const FrameResult& frame, const Picture& picture) {
+// With the exposure that the frame has; `camera`: at its time.
+RenderOptions FrameWriter::exposed_options(const FrameResult& frame, const Picture& picture,
+                                           const Camera& camera) {
     RenderOptions options = scene_.render;
-    options.camera = camera_at(options.camera, frame.time_s);
+    options.camera = camera;
     const bool follows = options.camera.exposure == Exposure::automatic && options.camera.adaptation_s > 0 &&
                          wants_png(scene_);
     options = with_exposure(options, picture);
@@ -154,7 +155,7 @@ Rgb8Image FrameWriter::write_picture(const FrameResult& frame, const Picture& pi
     metadata.frames_per_second = scene_.frames.per_second;
     metadata.time_scale = scene_.frames.time_scale;
     metadata.extinction_per_m = scene_.density.extinction_per_m;
-    const RenderOptions options = exposed_options(frame, picture);
+    const RenderOptions options = exposed_options(frame, picture, painter.camera(frame.time_s));
     if (scene_.frames.exr) write_exr(folder_.picture(frame.number, ".exr"), picture, options, metadata);
     if (!wants_png(scene_)) return {};
     Rgb8Image image = srgb8_image(picture, options);

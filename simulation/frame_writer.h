@@ -51,7 +51,7 @@ class FrameWriter {
 
     Scene scene_;
     RunFolder folder_;
-    RenderOptions exposed_options(const FrameResult& frame, const Picture& picture);
+    RenderOptions exposed_options(const FrameResult& frame, const Picture& picture, const Camera& camera);
 
     std::string scene_hash_;
     int first_frame_ = 1;

@@ -2,6 +2,7 @@
 #include "simulation/sky_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <unordered_map>
@@ -227,10 +228,8 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
                                     const Weather& weather, const std::optional<FilmFrame>& film,
                                     std::span<const DrawnVeil> veils) {
     check(moving);
-    RenderOptions standing = moving;
-    standing.camera = standing_camera(moving.camera, terrain_.get(), moving.ground);
-    RenderOptions options = standing;
-    options.camera = camera_at(standing.camera, time_s);
+    RenderOptions options = moving;
+    options.camera = camera(moving, time_s);
     options.sun = sun_at(moving.sun, time_s);
     const bool rain = options.precipitation.enabled && !weather.curtains.empty();
     layers_.resize(layers.size());
@@ -252,7 +251,11 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     const bool all = depth || rain;
     std::optional<Rainfall> rainfall;
     if (rain) {
-        rainfall = Rainfall{standing, weather, time_s};  // knows the camera's path itself
+        rainfall = Rainfall{moving, weather, time_s};
+        // It knows the camera's path itself, for the time that the shutter is open.
+        const double half_s = 0.5 * moving.precipitation.exposure_s;
+        rainfall->options.camera = standing_camera(moving.camera, terrain_.get(), moving.ground,
+                                                   std::array{time_s - half_s, time_s, time_s + half_s});
         rainfall->options.sun = options.sun;
         if (ground_cover) rainfall->options.ground.albedo = mean_albedo(options, *ground_cover);
     }
@@ -262,6 +265,10 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
                         depth_in_voxels(layers, options.sun, time_s), terrain_},
                        options, veils, std::move(rainfall));
     return {std::move(picture), std::move(options), std::move(lines), std::move(drawn)};
+}
+
+Camera SkyPainter::camera(const RenderOptions& options, double time_s) const {
+    return standing_camera(options.camera, terrain_.get(), options.ground, time_s);
 }
 
 Picture SkyPainter::finish(Renderer& renderer, PendingSkyPicture&& pending) {

@@ -144,6 +144,9 @@ class SkyPainter {
     // Sets the ground of later pictures that is not level (render/terrain/terrain.h); null: it is.
     void use_terrain(std::shared_ptr<const HeightMap> terrain) { terrain_ = std::move(terrain); }
     const std::shared_ptr<const HeightMap>& terrain() const { return terrain_; }
+    // Returns the camera with which a picture of these options at a time is drawn: without a path, its heights those of the
+    // world.
+    Camera camera(const RenderOptions& options, double time_s) const;
 
   private:
     std::vector<SkyBillboards> layers_;

@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "density/metaballs.h"
-#include "render/options/camera.h"
 #include "simulation/frame_painter.h"
 #include "simulation/scene_moment.h"
 #include "simulation/simulation.h"
@@ -18,13 +17,14 @@ namespace {
 constexpr double kLeastVoxelWithDetail_m = 20;
 constexpr std::uint64_t kMostMarchedVoxels = 16'000'000;
 
+// `camera`: that of the scene, if there is one, at the time of the picture and with world heights.
 RenderOptions render_options(const VolumePictureOptions& given, const std::optional<Scene>& scene,
-                             const DensityGrid& grid, double time_s) {
+                             const DensityGrid& grid, const Camera& camera) {
     RenderOptions options;
     const WorldBox box = cloud_box(grid);
     if (scene) {
         options = scene->render;
-        options.camera = camera_at(options.camera, time_s);
+        options.camera = camera;
     } else {
         options.camera.width = 1280;
         options.camera.height = 720;
@@ -42,7 +42,6 @@ RenderOptions render_options(const VolumePictureOptions& given, const std::optio
     if (given.g) options.light.phase.g = *given.g;
     if (given.view || !scene)
         frame(options.camera, box, given.view.value_or(View::side), options.ground.height_m);
-    if (given.view || given.camera_m) options.camera.above_ground = false;
     if (given.camera_m) options.camera.position_m = *given.camera_m;
     if (given.target_m) options.camera.target_m = *given.target_m;
     if (options.camera.position_m == options.camera.target_m)
@@ -79,7 +78,9 @@ VolumePicture draw_volume(const std::string& file, const LoadedDensity& loaded,
                           const DeviceOptions& device) {
     const double time_s = loaded.metadata ? loaded.metadata->time_s : 0;
     VolumePicture result;
-    result.options = render_options(given, scene, loaded.density, time_s);
+    Scene drawn = scene.value_or(Scene());
+    FramePainter painter(drawn, device);
+    result.options = render_options(given, scene, loaded.density, painter.camera(time_s));
     result.metaball_radius_voxels = radius_in_voxels(scene, loaded);
     if (given.extinction_per_m) {
         result.extinction_per_m = *given.extinction_per_m;
@@ -93,7 +94,6 @@ VolumePicture draw_volume(const std::string& file, const LoadedDensity& loaded,
     }
     result.metadata = metadata_of(file, loaded, result.extinction_per_m);
 
-    Scene drawn = scene.value_or(Scene());
     drawn.name = file;
     drawn.render = result.options;
     if (given.sun_deg) drawn.sun_path.clear();
@@ -109,7 +109,7 @@ VolumePicture draw_volume(const std::string& file, const LoadedDensity& loaded,
     }
     if (loaded.refine > 1 || loaded.density.placement().cell_size_m < kLeastVoxelWithDetail_m)
         drawn.density.detail.strength = drawn.density.detail.thermals = 0;
-    FramePainter painter(drawn, device);
+    painter.set_scene(drawn, true);
     result.backend = painter.backend_name();
     result.device = painter.device_name();
     painter.note_renderer(result.metadata);

@@ -34,7 +34,7 @@ struct VolumePictureOptions {
 
 struct VolumePicture {
     Picture picture;
-    RenderOptions options;     // it was drawn with; camera as at the file's time
+    RenderOptions options;     // it was drawn with; camera as at the file's time, with world heights
     PictureMetadata metadata;  // as picture files hold it
     std::size_t metaballs = 0;
     double metaball_radius_voxels = 0;

@@ -130,7 +130,7 @@ Rgb8Image LiveSimulation::picture() {
     const FrameResult frame = simulation_->present_frame();
     const Picture picture = painter_->draw(frame);
     RenderOptions options = scene_.render;
-    options.camera = camera_at(options.camera, frame.time_s);
+    options.camera = painter_->camera(frame.time_s);
     return srgb8_image(picture, with_exposure(options, picture));
 }
 

@@ -113,7 +113,7 @@ BenchRow terrain_row() {
     options.camera.above_ground = true;
     options.camera.position_m = {0, -15'000, 300};
     options.camera.target_m = {0, 0, 0};
-    options.camera = standing_camera(options.camera, map.get(), options.ground);
+    options.camera = standing_camera(options.camera, map.get(), options.ground, 0);
     const CameraFrame frame = camera_frame(options.camera);
     double sum = 0;
     const auto by_steps = [&] {
