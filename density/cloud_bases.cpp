@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 #include "density/openvdb_access.h"
 
@@ -28,13 +29,27 @@ void for_voxels(const DensityGrid& density, Visit&& visit) {
 }
 
 // The columns along the edge of a texel: the least that keep to kMostTexels and divide what repeats, if that is at most four
-// times as coarse as it has to be; otherwise 1.
-int texel_columns(const Extent& extent, bool repeats_x, bool repeats_y) {
+// times as coarse as it has to be. Otherwise a part of the largest number that divides both sides; 1 where that is smaller
+// than a texel has to be.
+double texel_columns(const Extent& extent, bool repeats_x, bool repeats_y) {
     const int least = (std::max(extent.x, extent.y) + CloudBases::kMostTexels - 1) / CloudBases::kMostTexels;
     for (int step = least; step <= 4 * least; ++step)
         if ((!repeats_x || extent.x % step == 0) && (!repeats_y || extent.y % step == 0)) return step;
-    return 1;
+    const int common = repeats_x && repeats_y ? std::gcd(extent.x, extent.y) : repeats_x ? extent.x : extent.y;
+    return common < least ? 1 : double(common) / (common / least);
 }
+
+// The texels that a column lies in, along one axis: as wide as a column at least, so that these are two at most.
+struct TexelsOfColumn {
+    int first = 0;
+    double in_first = 1;  // part of the column; the rest is in the next texel
+};
+TexelsOfColumn texels_of(int column, double texel) {
+    const int first = int(std::floor(column / texel));
+    return {first, std::min(1.0, (first + 1) * texel - column)};
+}
+
+int texels_along(int columns, double texel) { return int(std::ceil(columns / texel - 1e-9)); }
 
 int modulo(int n, int count) { return (n % count + count) % count; }
 
@@ -58,12 +73,12 @@ CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m, cons
     });
     bases.repeats_x = boundaries.x == Boundary::periodic;
     bases.repeats_y = boundaries.y == Boundary::periodic;
-    const int step = texel_columns(extent, bases.repeats_x, bases.repeats_y);
+    const double step = texel_columns(extent, bases.repeats_x, bases.repeats_y);
     bases.x_m = at.origin_m.x;
     bases.y_m = at.origin_m.y;
     bases.texel_m = step * at.cell_size_m;
-    bases.columns = (extent.x + step - 1) / step;
-    bases.rows = (extent.y + step - 1) / step;
+    bases.columns = texels_along(extent.x, step);
+    bases.rows = texels_along(extent.y, step);
     bases.water.assign(std::size_t(bases.columns) * std::size_t(bases.rows), 0.0f);
     bases.water_base_m.assign(bases.water.size(), 0.0f);
     const double to_depth = extinction_per_m * at.cell_size_m;
@@ -71,12 +86,21 @@ CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m, cons
         for (int x = 0; x < extent.x; ++x) {
             const std::size_t column = std::size_t(y) * std::size_t(extent.x) + std::size_t(x);
             if (largest[column] <= 0) continue;
-            const std::size_t texel =
-                std::size_t(y / step) * std::size_t(bases.columns) + std::size_t(x / step);
             const double water = (1 - std::exp(-sum[column] * to_depth / kDepthOfRain)) / (step * step);
             const double base_m = at.origin_m.z + (lowest[column] + 0.5) * at.cell_size_m;
-            bases.water[texel] += float(water);
-            bases.water_base_m[texel] += float(water * base_m);
+            const TexelsOfColumn across = texels_of(x, step), up = texels_of(y, step);
+            for (const int dy : {0, 1}) {
+                for (const int dx : {0, 1}) {
+                    const double part = (dx == 0 ? across.in_first : 1 - across.in_first) *
+                                        (dy == 0 ? up.in_first : 1 - up.in_first);
+                    // What rounding puts beyond the last texel is none.
+                    if (part < 1e-9 || across.first + dx >= bases.columns || up.first + dy >= bases.rows) continue;
+                    const std::size_t texel = std::size_t(up.first + dy) * std::size_t(bases.columns) +
+                                              std::size_t(across.first + dx);
+                    bases.water[texel] += float(part * water);
+                    bases.water_base_m[texel] += float(part * water * base_m);
+                }
+            }
         }
     }
     return bases;

@@ -12,7 +12,9 @@
 namespace nephos {
 
 struct CloudBases {
-    // Along an edge; larger grids have texels of several columns, as many as divide a periodic grid.
+    // Along an edge; larger grids have texels of several columns, of parts of one where no number of whole ones divides a
+    // periodic grid. Texels are squares: of a grid both of whose sides are periodic and have no large divisor in common each
+    // column is one, however many there are.
     static constexpr int kMostTexels = 192;
 
     double x_m = 0, y_m = 0;  // south-western corner, world

@@ -81,6 +81,38 @@ TEST(CloudBases, RepeatWithTheirGrid) {
     EXPECT_EQ(coarse.columns * 5, wide.x);
 }
 
+// No number of whole columns divides a prime side.
+TEST(CloudBases, OfPrimeSidesKeepToTheirTexelsAndTheirWater) {
+    constexpr Boundaries kPeriodic{Boundary::periodic, Boundary::periodic, Boundary::open};
+    const Extent prime{197, 197, 2};
+    std::vector<float> values(prime.cells(), 0.0f);
+    for (int j = 60; j < 140; ++j)
+        for (int i = 0; i < 50; ++i) values[std::size_t((1 * prime.y + j) * prime.x + i)] = 0.8f;
+    const CloudBases bases = cloud_bases(DensityGrid::from_dense(values, prime, kPlacement), 0.02, kPeriodic);
+    EXPECT_LE(bases.columns, CloudBases::kMostTexels);
+    EXPECT_EQ(bases.columns, bases.rows);
+    EXPECT_NEAR(bases.columns * bases.texel_m, 19'700, 1e-6);  // the period
+    const double water = 1 - std::exp(-0.8 * 2 / 10);
+    double sum = 0;
+    for (const float each : bases.water) sum += double(each);
+    EXPECT_NEAR(sum * bases.texel_m * bases.texel_m, water * 5000 * 8000, 1e-4 * water * 5000 * 8000);
+    for (const double more : {0.0, 19'700.0, -39'400.0}) {
+        const CloudBases::Column in = bases.at(1000 + 2500 + more, -500 + 10'000 - more);
+        EXPECT_NEAR(in.water, water, 1e-5);
+        EXPECT_NEAR(in.base_m, 850, 1e-2);
+        EXPECT_EQ(bases.at(1000 + 9000 + more, -500 + 10'000).water, 0);
+    }
+    const Extent wide{400, 197, 1};  // nothing in common
+    const CloudBases all =
+        cloud_bases(DensityGrid::from_dense(std::vector<float>(wide.cells(), 1.0f), wide, kPlacement), 0.05, kPeriodic);
+    EXPECT_EQ(all.columns, 400);
+    EXPECT_EQ(all.rows, 197);
+    const CloudBases row = cloud_bases(DensityGrid::from_dense(std::vector<float>(wide.cells(), 1.0f), wide, kPlacement), 0.05,
+                                       {Boundary::open, Boundary::periodic, Boundary::open});
+    EXPECT_LE(row.columns, CloudBases::kMostTexels);
+    EXPECT_NEAR(row.rows * row.texel_m, 19'700, 1e-6);
+}
+
 TEST(CloudBases, OfNothingAreDry) {
     EXPECT_EQ(cloud_bases(DensityGrid(), 0.05).columns, 0);
     EXPECT_EQ(cloud_bases(grid_of(std::vector<float>(kExtent.cells(), 0.0f)), 0.05).at(1250, -350).water, 0);
