@@ -50,7 +50,7 @@ void ViewPass::use_shells(const GpuDevice& gpu, const AirShells& shells, const V
 }
 
 void ViewPass::use_terrain(const GpuDevice& gpu, std::span<const float> distance_m) {
-    upload(gpu, terrain_, std::as_bytes(distance_m));
+    upload_terrain(gpu, terrain_, distance_m);
     resources_.set({{23, terrain_}});
 }
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "core/error.h"
 #include "render/frame/billboard_textures.h"
 #include "render/shared/half_floats.h"
 #include "render/shared/shared.h"
@@ -40,6 +41,16 @@ GpuImage upload_billboard_textures(const GpuDevice& gpu, const BillboardPictures
             texels.push_back(pack_halves(float(level.texels[i]) / 255, float(level.texels[i + 1]) / 255));
     upload_image(gpu, image, std::as_bytes(std::span(texels)));
     return image;
+}
+
+void upload_terrain(const GpuDevice& gpu, GpuBuffer& buffer, std::span<const float> distance_m) {
+    const std::size_t most = gpu.properties.limits.maxStorageBufferRange;
+    if (distance_m.size_bytes() > most)
+        throw Error(ErrorCode::usage, "this Vulkan device draws ground that is not level in pictures of at most " +
+                                          std::to_string(most / sizeof(float)) + " pixels, but this one has " +
+                                          std::to_string(distance_m.size()) +
+                                          ": choose the back-end cpu, or a smaller picture");
+    upload(gpu, buffer, std::as_bytes(distance_m));
 }
 
 ShellBuffers::ShellBuffers(const GpuDevice& gpu)

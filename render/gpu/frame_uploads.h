@@ -5,6 +5,7 @@
 // T's billboards, the shells of air. Private to the module.
 
 #include <cstdint>
+#include <span>
 
 #include "render/atmosphere/sky_light.h"
 #include "render/frame/air_shells.h"
@@ -29,6 +30,10 @@ class SkyImage {
 
 // Uploads the textures of billboard_textures.h with all levels, readable by shaders; `pictures`: with those, or null.
 GpuImage upload_billboard_textures(const GpuDevice& gpu, const BillboardPictures* pictures);
+
+// Uploads where the rays of a picture end at ground that is not level. Throws Error(usage) for more than shaders see of a
+// buffer.
+void upload_terrain(const GpuDevice& gpu, GpuBuffer& buffer, std::span<const float> distance_m);
 
 // The shells of air: bindings 13 and 14 of shells.glsl.
 class ShellBuffers {

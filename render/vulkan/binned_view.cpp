@@ -397,7 +397,7 @@ void BinnedView::begin_part(const ViewInputs& what, const shader::FrameUniforms&
     if (what.shells != nullptr) write(gpu_, slot.shells, *what.shells);
     upload(gpu_, slot.billboards, std::as_bytes(what.billboards));
     upload(gpu_, slot.clouds, std::as_bytes(what.clouds));
-    upload(gpu_, slot.terrain, std::as_bytes(what.terrain));
+    upload_terrain(gpu_, slot.terrain, what.terrain);
     if (what.march != nullptr) write(gpu_, slot.march, *what.march);
     slot.what.shells = nullptr;  // these are there
     slot.what.march = nullptr;

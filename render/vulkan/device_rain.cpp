@@ -126,7 +126,8 @@ bool DeviceRain::begin(const RainFrame& rain, const Weather& weather, const GpuI
                        Picture& picture) {
     std::optional<RainData> data = rain_data(rain, weather, picture);
     if (!data) return false;
-    if (sizeof(shader::RainParticle) * rain.particles > gpu_.properties.limits.maxStorageBufferRange)
+    const std::size_t most = gpu_.properties.limits.maxStorageBufferRange;
+    if (sizeof(shader::RainParticle) * rain.particles > most || sizeof(float) * data->bases.size() > most)
         return false;
     if (!data->shafts && data->passes.empty() && data->splashes.empty()) return true;  // nothing falls in view
     ++pictures;

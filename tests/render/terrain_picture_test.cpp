@@ -5,12 +5,18 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "density/density_grid.h"
+#include "density/metaballs.h"
 #include "render/renderer.h"
 #include "render/terrain/height_map.h"
+#include "tests/render/random_billboards.h"
+#include "tests/render/renderer_test_access.h"
 #include "tests/render/shared_renderers.h"
 
 namespace nephos {
@@ -103,6 +109,87 @@ TEST(TerrainPicture, BackendsAgree) {
             EXPECT_LE(difference(processor, tiles), 1.0 / 255) << y << physical;
             EXPECT_LE(difference(processor, billboards), 1.0 / 255) << y << physical;
         }
+    }
+}
+
+// Billboards before and behind the wall, through it where their clouds stand in it, and pictures in parts.
+TEST(TerrainPicture, BackendsAgreeAboutBillboards) {
+    for (const double y : {1500.0, 3000.0, 5000.0}) {
+        std::vector<CloudBillboard> billboards = test::random_billboards(4, 120, 1);
+        for (CloudBillboard& each : billboards) each.centre_m = each.centre_m + Vec3{0, y, -700};
+        const std::vector<BillboardCloud> clouds{{{0, y, 300}, -100, 700}};
+        Splats splats = test::scene_of(clouds, billboards);
+        splats.terrain = wall();
+        const auto drawn = [&](Splatting way) { return test::renderer(way).draw_splats(splats, view()); };
+        const Picture processor = drawn(Splatting::cpu);
+        EXPECT_LE(difference(processor, drawn(Splatting::vulkan)), 1.0 / 255) << y;
+        EXPECT_LE(difference(processor, drawn(Splatting::blended)), 1.0 / 255) << y;
+        Splats open = splats;
+        open.terrain = nullptr;
+        if (y == 5000) {  // the wall hides some
+            EXPECT_GT(difference(processor, test::renderer().draw_splats(open, view())), 0.05);
+        }
+    }
+}
+
+TEST(TerrainPicture, PartsDoNotShow) {
+    RenderOptions options = view();
+    options.atmosphere.model = AirModel::physical;
+    Splats splats;
+    const std::vector<Metaball> balls = balls_at(1500, 350);
+    splats.metaballs = {balls, 0.02, 0.7};
+    splats.terrain = wall();
+    for (const Splatting way : {Splatting::cpu, Splatting::vulkan, Splatting::blended}) {
+        Renderer parts(DeviceOptions{.part_size = 40, .splatting = way});
+        EXPECT_LE(difference(test::renderer(way).draw_splats(splats, options), parts.draw_splats(splats, options)), 1e-4)
+            << int(way);
+    }
+}
+
+// Voxels with detail, which rays march through up to the wall.
+TEST(TerrainPicture, BackendsAgreeAboutDetail) {
+    const Extent extent{24, 16, 12};
+    std::vector<float> values;
+    for (std::size_t n = 0; n < extent.cells(); ++n) values.push_back(n % 7 == 0 ? 0.0f : 0.3f);
+    for (const double y : {1200.0, 2600.0, 5000.0}) {
+        std::vector<DetailedVoxels> detailed(1);
+        DetailedVoxels& part = detailed[0];
+        part.density = DensityGrid::from_dense(values, extent, {{-700, y, 80}, 40});
+        part.setting = {.options = {}, .extinction_per_m = 0.1};
+        const std::vector<Metaball> balls = metaballs(part.density, part.setting.metaball_radius_cells);
+        part.count = balls.size();
+        Splats splats;
+        splats.metaballs = {balls, 0.1, metaball_normalisation(part.setting.metaball_radius_cells), detailed};
+        splats.terrain = wall();
+        const Picture processor = test::renderer().draw_splats(splats, view()),
+                      tiles = test::renderer(Splatting::vulkan).draw_splats(splats, view());
+        std::size_t apart = 0, covered = 0;
+        for (std::size_t n = 0; n < processor.beauty.size(); ++n)
+            apart += std::abs(processor.beauty[n] - tiles.beauty[n]) > 1.0f / 255 ? 1 : 0;
+        for (const float left : processor.transmittance) covered += left < 0.5f ? 1 : 0;
+        EXPECT_LE(apart, processor.beauty.size() / 1000) << y;
+        EXPECT_GT(covered, y < 5000 ? 300u : 0u) << y;
+    }
+}
+
+// More pixels than shaders see of a buffer.
+TEST(TerrainPicture, RefusesMorePixelsThanTheDeviceSees) {
+    Splats splats;
+    splats.terrain = wall();
+    for (const Splatting way : {Splatting::vulkan, Splatting::blended}) {
+        Renderer small(DeviceOptions{.splatting = way});
+        const Picture before = small.draw_splats(splats, view());
+        RendererTestAccess::limit_storage(small, 4 * 96 * 72 - 1);
+        try {
+            small.draw_splats(splats, view());
+            FAIL() << int(way);
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::usage);
+            EXPECT_NE(std::string(error.what()).find("at most 6911 pixels, but this one has 6912"), std::string::npos)
+                << error.what();
+        }
+        RendererTestAccess::limit_storage(small, 1u << 27);
+        EXPECT_EQ(small.draw_splats(splats, view()).beauty, before.beauty);
     }
 }
 
