@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -79,15 +80,40 @@ std::shared_ptr<const CloudBases> cloud_of(const Scene& scene, std::size_t n, co
 }  // namespace
 
 FramePainter::FramePainter(const Scene& scene, const DeviceOptions& device)
-    : scene_(scene), renderer_(device) {
+    : scene_(scene), renderer_(device), ground_(ground_of(scene)), textures_(textures_of(scene)) {
     painter_.use_textures(read_textures(scene.models));
     painter_.use_terrain(make_terrain(scene.render.terrain, scene.render.ground));
 }
 
+FramePainter::FileState FramePainter::state_of(const std::filesystem::path& file) {
+    FileState state{.path = file};
+    std::error_code none;
+    if (const std::uintmax_t bytes = std::filesystem::file_size(file, none); !none) state.bytes = bytes;
+    if (const auto time = std::filesystem::last_write_time(file, none); !none) state.time = time;
+    return state;
+}
+
+// Without what only covers it.
+FramePainter::Ground FramePainter::ground_of(const Scene& scene) {
+    Ground ground{.options = scene.render.terrain, .height_m = scene.render.ground.height_m};
+    const TerrainOptions plain;
+    ground.options.rock_slope_deg = plain.rock_slope_deg;
+    ground.options.rock_albedo = plain.rock_albedo;
+    ground.options.snow_line_m = plain.snow_line_m;
+    if (ground.options.height_map) ground.file = state_of(*ground.options.height_map);
+    return ground;
+}
+
+std::vector<FramePainter::FileState> FramePainter::textures_of(const Scene& scene) {
+    std::vector<FileState> states;
+    for (const std::string& file : texture_files(scene.models)) states.push_back(state_of(file));
+    return states;
+}
+
 void FramePainter::set_scene(const Scene& scene, bool same_layers) {
-    const bool same_textures = texture_files(scene.models) == texture_files(scene_.models);
-    const bool same_terrain = scene.render.terrain == scene_.render.terrain &&
-                              scene.render.ground.height_m == scene_.render.ground.height_m;
+    Ground ground = ground_of(scene);  // before they are read
+    std::vector<FileState> files = textures_of(scene);
+    const bool same_textures = files == textures_, same_terrain = ground == ground_;
     if (same_layers && same_textures && same_terrain) {
         scene_ = scene;
         return;
@@ -99,6 +125,8 @@ void FramePainter::set_scene(const Scene& scene, bool same_layers) {
     if (!same_layers) painter_ = SkyPainter();
     painter_.use_textures(std::move(textures));
     painter_.use_terrain(std::move(terrain));
+    ground_ = std::move(ground);
+    textures_ = std::move(files);
 }
 
 void FramePainter::add_detail(const DensityGrid& density, const std::optional<DensityGrid>& moisture,

@@ -10,6 +10,8 @@
 // or snow, what lies on the ground, lightning, and the debug view, as scene.render asks for them and as camera
 // and sun stand at the frame's time.
 
+#include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -55,6 +57,7 @@ class FramePainter {
 
     // Draws later frames as another scene asks for, with the same back-end and what it has cached. `same_layers`: frames
     // are still those of the simulation that drawn ones came from; false: of another one, and textures are read again.
+    // Textures and height map are read again, too, when their files' times or sizes are others.
     // Throws as read_textures(), and then draws as before. Precondition: no frame is begun and not finished.
     void set_scene(const Scene& scene, bool same_layers);
 
@@ -78,9 +81,29 @@ class FramePainter {
                     std::optional<std::size_t> layer, double time_s, std::size_t first, std::size_t count,
                     std::vector<DetailedVoxels>& to) const;
 
+    // A file as it was when it was read; one that is not there has neither size nor time.
+    struct FileState {
+        std::filesystem::path path;
+        std::uintmax_t bytes = 0;
+        std::filesystem::file_time_type time{};
+        bool operator==(const FileState&) const = default;
+    };
+    static FileState state_of(const std::filesystem::path& file);
+    // What the height map and the textures of a scene are made of.
+    struct Ground {
+        TerrainOptions options;  // that shape it
+        double height_m = 0;
+        std::optional<FileState> file;
+        bool operator==(const Ground&) const = default;
+    };
+    static Ground ground_of(const Scene& scene);
+    static std::vector<FileState> textures_of(const Scene& scene);
+
     Scene scene_;
     Renderer renderer_;
     SkyPainter painter_;
+    Ground ground_;                     // of the painter's height map
+    std::vector<FileState> textures_;  // of its textures
 };
 
 // Returns the rain or snow of a frame as the renderer draws it: the curtains of all layers, from the ground of
