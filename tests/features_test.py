@@ -1,14 +1,15 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Fails when docs/features.md does not agree with the tree: a row names a file, a symbol, a scene, a key or a test that is
-not there, lacks one of them, or a shipped scene stands in no row. The root of the source tree is the argument; with
---self-test the checker itself is tested: it must see each kind of wrong row."""
+not there, or a key that its scene does not have, lacks one of them, or a shipped scene stands in no row. The root of the
+source tree is the argument; with --self-test the checker itself is tested: it must see each kind of wrong row."""
 
 import json
 import pathlib
 import re
 import sys
 import tempfile
+import tomllib
 
 PAGE = "docs/features.md"
 COLUMNS = ("feature", "code", "scene", "test")
@@ -32,6 +33,15 @@ def is_key(schema, path):
             return False
         at = found[0]
     return True
+
+
+def has_key(scene, path):
+    """Whether a scene says something for a key, in one of the tables of an array at least."""
+    found = [tomllib.loads(scene.read_text(encoding="utf-8"))]
+    for name in re.sub(r"\[\d+\]", "", path).split("."):
+        tables = [each for at in found for each in (at if isinstance(at, list) else [at]) if isinstance(each, dict)]
+        found = [table[name] for table in tables if name in table]
+    return bool(found)
 
 
 def rows(text):
@@ -61,6 +71,12 @@ def row_problems(root, cells, tests, schema):
     elif not (root / scene[0]).is_file():
         yield f"there is no {scene[0]}"
     for setting in scene[1:]:
+        if not setting.startswith("--"):
+            if not is_key(schema, setting):
+                yield f"{setting} is no key"
+            elif (root / scene[0]).is_file() and not has_key(root / scene[0], setting):
+                yield f"{scene[0]} has no {setting}"
+            continue
         match = re.fullmatch(r"--set ([^=]+)=.+", setting)
         if not match or not is_key(schema, match.group(1)):
             yield f"{setting} sets no key"
@@ -89,21 +105,25 @@ def problems(root):
 
 def self_test():
     head = "| feature | code | scene | test |\n|---|---|---|---|\n"
-    good = "| a | `a.h` `thing` | `scenes/a.toml` `--set layer[0].deep.key=1` | `Suite.Test` |\n"
+    good = "| a | `a.h` `thing` | `scenes/a.toml` `--set layer[0].deep.key=1` | `Suite.Test` |\n" \
+           "| a | `a.h` `thing` | `scenes/a.toml` `layer[0].flat` | `Suite.Test` |\n"
     wrong = {
         "| b | `gone.h` `thing` | `scenes/a.toml` | `Suite.Test` |": "there is no gone.h",
         "| c | `a.h` `thin` | `scenes/a.toml` | `Suite.Test` |": "a.h has no thin",
         "| d | `a.h` `thing` | `scenes/gone.toml` | `Suite.Test` |": "there is no scenes/gone.toml",
         "| e | `a.h` `thing` | `scenes/a.toml` `--set layer.none=1` | `Suite.Test` |":
             "--set layer.none=1 sets no key",
+        "| j | `a.h` `thing` | `scenes/a.toml` `layer.none` | `Suite.Test` |": "layer.none is no key",
+        "| k | `a.h` `thing` | `scenes/a.toml` `layer[0].deep` | `Suite.Test` |": "scenes/a.toml has no layer[0].deep",
         "| f | `a.h` `thing` | `scenes/a.toml` | `Suite.Gone` |": "there is no test Suite.Gone",
         "| g | `a.h` `thing` | `scenes/a.toml` | `tests/t.py` `test_gone` |": "tests/t.py has no test_gone",
         "| h | `a.h` `thing` | | `Suite.Test` |": "expected 4 columns with something in each",
         "| i | `a.h` | `scenes/a.toml` | `tests/t.py` `test_it` |": "expected a file and a symbol as code",
     }
     schema = {"properties": {"layer": {"type": "array", "items": {"properties": {
-        "deep": {"properties": {"key": {"type": "number"}}}}}}}}
-    tree = {PAGE: head + good + "\n".join(wrong) + "\n", "a.h": "void thing();\n", "scenes/a.toml": "", "scenes/b.toml": "",
+        "flat": {"type": "number"}, "deep": {"properties": {"key": {"type": "number"}}}}}}}}
+    tree = {PAGE: head + good + "\n".join(wrong) + "\n", "a.h": "void thing();\n", "scenes/a.toml": "[[layer]]\nflat = 1\n",
+            "scenes/b.toml": "",
             "scenes/nephos.schema.json": json.dumps(schema), "tests/t.cpp": "TEST(Suite, Test) {}\n",
             "tests/t.py": "def test_it():\n    pass\n"}
     with tempfile.TemporaryDirectory() as folder:
@@ -112,9 +132,9 @@ def self_test():
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             (root / path).write_text(text, encoding="utf-8")
         count, found = problems(root)
-    expected = [f"{PAGE}:{number}: {problem}" for number, problem in enumerate(wrong.values(), 4)]
+    expected = [f"{PAGE}:{number}: {problem}" for number, problem in enumerate(wrong.values(), 5)]
     expected.append(f"{PAGE}: no row shows scenes/b.toml")
-    if found != expected or count != len(wrong) + 1:
+    if found != expected or count != len(wrong) + 2:
         sys.exit(f"seen {found}, not {expected}")
     print(f"{len(expected)} wrong rows seen")
 
