@@ -273,7 +273,7 @@ void change(const Key& key, void* value) {
             as<std::string>(value) += "-other";
             break;
         case KeyKind::path:
-            as<std::optional<std::filesystem::path>>(value) = "/a folder/\"state\"\t\xE9\x9B\xB2.vdb";
+            as<std::optional<std::filesystem::path>>(value) = "/a folder/\"state\"\t\xE9\x9B\xB2.png";
             break;
         case KeyKind::word:
             key.set_word(value, key.word_index(value) == 0 ? 1 : 0);
