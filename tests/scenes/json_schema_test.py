@@ -16,8 +16,8 @@ BAD = ROOT / "tests/scenes/bad"
 # What concerns several keys, or file names, is beyond a schema; so is what is no TOML at all.
 ACCEPTED_BY_THE_SCHEMA = {
     "layer_with_field", "layers_names", "layers_reach", "layers_simulation", "layers_slab_alone", "layers_veil",
-    "layers_veil_fine",
-    "sky_without_layer", "sun_date", "sun_date_alone", "sun_moves", "sun_time", "camera_path_times",
+    "layers_veil_fine", "sky_without_layer", "sun_date", "sun_date_alone", "sun_moves", "sun_path_date",
+    "sun_path_times", "sun_time", "terrain_ending", "terrain_raw", "terrain_raw_size", "camera_path_times",
     "camera_point", "empty", "only_comment", "frames_beyond", "frames_start", "frames_too_many", "name",
     "name_empty", "periodic_size", "shells_far", "wind_order", "wind_times", "wind_too_fast",
 }
