@@ -5,6 +5,7 @@
 #include <array>
 #include <cstring>
 #include <span>
+#include <utility>
 
 #include "render/frame/tile_bins.h"
 
@@ -53,14 +54,15 @@ void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {
     const auto size = std::uint32_t(shadow_size);
     if (map_.width == size) return;
     map_ = {};
-    map_ = create_image(gpu, size, size, 1, vk::Format::eR32Sfloat,
-                        vk::ImageUsageFlagBits::eStorage | vk::ImageUsageFlagBits::eSampled |
-                            vk::ImageUsageFlagBits::eTransferDst);
+    GpuImage map = create_image(gpu, size, size, 1, vk::Format::eR32Sfloat,
+                                vk::ImageUsageFlagBits::eStorage | vk::ImageUsageFlagBits::eSampled |
+                                    vk::ImageUsageFlagBits::eTransferDst);
     depths_ = create_buffer(gpu, std::size_t{size} * size * sizeof(float),
                             vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferSrc,
                             gpu.unified_memory ? HostAccess::read : HostAccess::none);
     submit_and_wait(
-        gpu, [&](const vk::raii::CommandBuffer& commands) { begin_image(commands, map_, access::compute); });
+        gpu, [&](const vk::raii::CommandBuffer& commands) { begin_image(commands, map, access::compute); });
+    map_ = std::move(map);  // all of it is there
 }
 
 void LightTiles::use(const GpuDevice& gpu, std::span<const float> shadow, int shadow_size) {

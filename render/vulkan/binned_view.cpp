@@ -363,6 +363,7 @@ void BinnedView::reserve(const PicturePart& part, Slot& slot) {
         wait();
         lists_.reserve(gpu_, sizes);
         ordered_ = nullptr;
+        depth_ = {};  // until both are there
         make_storage(gpu_, radiance_, 4 * sizeof(float) * pixels);
         make_storage(gpu_, depth_, sizeof(float) * pixels);
     }

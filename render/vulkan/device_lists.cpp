@@ -113,28 +113,28 @@ shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options,
 }
 
 bool DeviceLists::has_room(const ListSizes& sizes) const {
-    return sums_.bytes != 0 && sizes.splats <= splat_capacity_ && sizes.billboards <= billboard_capacity_ &&
+    return balls_.bytes != 0 && sums_.bytes != 0 && sizes.splats <= splat_capacity_ && sizes.billboards <= billboard_capacity_ &&
            sizes.tiles <= tile_capacity_ && sizes.entries <= entry_capacity_;
 }
 
 void DeviceLists::reserve_cloud(const GpuDevice& gpu, std::size_t balls) {
     if (cloud_.bytes != 0 && balls <= ball_capacity_) return;
-    ball_capacity_ = 0;  // until both are there
+    cloud_ = {};  // the last that is made: until both are there
     const std::size_t count = whole_blocks(balls);
-    make_storage(gpu, cloud_, count * sizeof(shader::CloudBall));
     make_storage(gpu, flash_, count * sizeof(shader::uint));
+    make_storage(gpu, cloud_, count * sizeof(shader::CloudBall));
     ball_capacity_ = count;
 }
 
 void DeviceLists::reserve_splats(const GpuDevice& gpu, std::size_t count, std::size_t billboards) {
     constexpr std::size_t kWord = sizeof(shader::uint);
-    splat_capacity_ = 0;  // until all of them are there
-    make_storage(gpu, balls_, count * sizeof(shader::ViewBall));
+    balls_ = {};  // the last that is made: until all of them are there
     make_storage(gpu, splats_, (count + 4 * billboards) * sizeof(shader::ViewSplat));
     make_storage(gpu, tails_, count * kWord);
     make_storage(gpu, boxes_, count * 2 * kWord);
     for (GpuBuffer* each : {&order_.keys[0], &order_.keys[1], &order_.values[0], &order_.values[1]})
         make_storage(gpu, *each, count * kWord);
+    make_storage(gpu, balls_, count * sizeof(shader::ViewBall));
     splat_capacity_ = count;
     billboard_capacity_ = billboards;
 }
