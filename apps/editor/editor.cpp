@@ -50,6 +50,16 @@ void follow_document(Editor& editor) {
     if (camera_changed) take_scene_camera(editor);
 }
 
+// Gives a camera whose heights are above the ground those of the world, which its first picture knows: flying, pointing and
+// what lies over the picture want them.
+void stand_on_ground(Editor& editor) {
+    Camera& camera = editor.camera.camera;
+    if (!camera.above_ground || !(editor.picture->view.camera == camera)) return;
+    camera.position_m = editor.picture->position_m;
+    camera.target_m = editor.picture->target_m;
+    camera.above_ground = false;
+}
+
 // The rows of steps are taken with a picture, so that plots and picture change in one frame, or after a while without.
 void take_new_results(Editor& editor, Clock::time_point& taken) {
     const std::uint64_t known = editor.picture ? editor.picture->number : 0;
@@ -57,6 +67,7 @@ void take_new_results(Editor& editor, Clock::time_point& taken) {
         editor.window->set_picture(next->width, next->height, next->rgba.data());
         editor.picture = std::move(next);
         ++editor.pictures;
+        stand_on_ground(editor);
     } else if (editor.running && Clock::now() - taken < kRowsAlone) {
         return;
     }

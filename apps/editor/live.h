@@ -68,7 +68,7 @@ enum ViewMode { kBeauty, kDensityMode, kTransmittanceMode, kLightOnly, kWirefram
 
 // Says how a picture is drawn.
 struct LiveView {
-    Camera camera;                  // of the window: without path
+    Camera camera;                  // of the window: without path; above the ground until a picture knows it
     int width = 640, height = 360;  // of the picture when nothing moves, pixels
     bool detail = true;             // procedural detail when nothing moves
     int mode = kBeauty;             // a ViewMode, index of kViewModes
@@ -84,8 +84,9 @@ struct LivePicture {
     std::vector<std::uint8_t> rgba;  // row 0 at the top
     std::uint64_t step = 0;
     double time_s = 0;
-    LiveView view;         // that it was asked for with
-    bool refined = false;  // at the full size, with detail
+    LiveView view;                  // that it was asked for with
+    Vec3 position_m{}, target_m{};  // of its camera, in the world
+    bool refined = false;           // at the full size, with detail
     double draw_ms = 0;
     std::uint64_t number = 0;        // rises
     std::uint64_t scene_number = 0;  // of the scene that it was drawn with, LiveStatus::scenes then

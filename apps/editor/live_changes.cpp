@@ -343,6 +343,8 @@ void keep_camera(Editor& editor) {
     const auto kept = [&](std::string text) {
         text = with_value(text, text_path("camera.position_m"), place(camera.position_m));
         text = with_value(text, text_path("camera.target_m"), place(camera.target_m));
+        if (editor.shown_scene && editor.shown_scene->render.camera.above_ground && !camera.above_ground)
+            text = with_value(text, text_path("camera.above_ground"), "false");
         return with_value(text, text_path("camera.vertical_fov_deg"),
                           number_text(camera.vertical_fov_deg, 4));
     };

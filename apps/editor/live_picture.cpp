@@ -20,6 +20,7 @@ Scene scene_of_view(const Scene& scene, const LiveView& view, double scale, bool
     Camera& camera = out.render.camera;
     camera.position_m = view.camera.position_m;
     camera.target_m = view.camera.target_m;
+    camera.above_ground = view.camera.above_ground;
     camera.vertical_fov_deg = view.camera.vertical_fov_deg;
     camera.path.clear();
     camera.width = std::max(16, int(std::lround(scale * view.width)));
@@ -103,7 +104,13 @@ std::shared_ptr<LivePicture> LivePictureMaker::draw(FramePainter& painter, const
     const Scene drawn = scene_of_view(scene, view, scale, refine && view.detail);
     Picture picture;
     Camera seen = drawn.render.camera;
-    if (view.mode == kWireframe || view.mode == kVoxels) {
+    const bool voxels = view.mode == kWireframe || view.mode == kVoxels;
+    if (!voxels || seen.above_ground) painter.set_scene(drawn, same_layers);
+    if (seen.above_ground) seen = painter.camera(frame->frame.time_s);
+    auto made = std::make_shared<LivePicture>();
+    made->position_m = seen.position_m;
+    made->target_m = seen.target_m;
+    if (voxels) {
         seen.exposure = Exposure::manual;
         seen.exposure_ev = seen.glare = 0;
         seen.tone_curve = ToneCurve::exponential;
@@ -111,7 +118,6 @@ std::shared_ptr<LivePicture> LivePictureMaker::draw(FramePainter& painter, const
                                 {view.hum, view.act, view.cld, view.slab_low, view.slab_high,
                                  view.mode == kWireframe});
     } else {
-        painter.set_scene(drawn, same_layers);
         picture = painter.draw(shown_part(frame->frame, view));
     }
     std::vector<std::uint8_t> rgb;
@@ -122,7 +128,6 @@ std::shared_ptr<LivePicture> LivePictureMaker::draw(FramePainter& painter, const
     } else {
         rgb = to_srgb8(picture, seen);
     }
-    auto made = std::make_shared<LivePicture>();
     made->width = picture.width;
     made->height = picture.height;
     made->rgba = with_alpha(rgb);

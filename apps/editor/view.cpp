@@ -205,6 +205,7 @@ void frame_scene(Editor& editor) {
     }
     Camera& camera = editor.camera.camera;
     camera = camera_of_view(editor);
+    camera.above_ground = false;
     nephos::frame(camera, box, View::side, editor.shown_scene->render.ground.height_m);
     editor.camera.moved = true;
 }

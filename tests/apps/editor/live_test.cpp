@@ -213,6 +213,22 @@ TEST(LiveScene, FramesAreDrawnWithTheSceneThatTheyAreOf) {
     EXPECT_EQ(live.status().failure, "");
 }
 
+// A camera whose heights are counted from the ground is drawn from there, in each mode, and the picture says where that is.
+TEST(LiveScene, PicturesSayWhereACameraAboveTheGroundStands) {
+    LiveScene live({.splatting = Splatting::cpu});
+    LiveView view = small_view();
+    view.camera.above_ground = true;
+    live.set_view(view);
+    live.start(small_scene("above_ground = true\n[ground]\nheight_m = 250\n"), 1);
+    for (const int mode : {int(kBeauty), int(kVoxels), int(kWireframe)}) {
+        view.mode = mode;
+        live.set_view(view);
+        ASSERT_TRUE(comes([&] { return live.picture(0) && live.picture(0)->view == view; })) << live.status().failure;
+        EXPECT_EQ(live.picture(0)->position_m.z, 650) << mode;
+        EXPECT_EQ(live.picture(0)->target_m.z, view.camera.target_m.z + 250) << mode;
+    }
+}
+
 // Scenes with more and with fewer layers in turn, while views change: under a sanitizer no index is out of bounds.
 TEST(LiveScene, NumberOfLayersChangesWhileItIsDrawn) {
     LiveScene live({.splatting = Splatting::cpu});
