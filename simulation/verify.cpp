@@ -164,7 +164,6 @@ void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
                                  difference));
 }
 
-// How much a sequence moves from frame to frame.
 // Sums and maxima in so many lanes that the compiler makes vectors of them, as their order is fixed.
 constexpr std::size_t kLanes = 16;
 
@@ -197,6 +196,7 @@ float largest_change(const std::vector<float>& before, const std::vector<float>&
     return *std::ranges::max_element(lanes);
 }
 
+// How much a sequence moves from frame to frame.
 class Motion {
   public:
     void add(const DensityGrid& grid) {

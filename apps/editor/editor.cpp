@@ -386,11 +386,20 @@ int run_editor(const EditorOptions& options) {
     } catch (const std::exception& error) {
         throw Error(ErrorCode::io, error.what() + kept_edits(editor));
     }
-    finish_export(editor);
+    std::string failure;
+    try {
+        finish_export(editor);
+    } catch (const std::exception& error) {
+        failure = error.what();
+    }
     if (options.report) report.print(editor);
-    if (status != 0) return status;  // by a signal: edits were kept
+    if (status != 0) {  // by a signal: edits were kept
+        if (!failure.empty()) fmt::print(stderr, "error: {}\n", failure);
+        return status;
+    }
     for_each_scene(editor, [](OpenScene& scene) { scene.document->remove_autosave(); });
     keep_settings(editor);
+    if (!failure.empty()) throw Error(ErrorCode::io, failure);
     const std::vector<std::string> messages = editor.window->validation_messages();
     for (const std::string& message : messages) fmt::print(stderr, "validation: {}\n", message);
     return messages.empty() ? status : int(ErrorCode::gpu);

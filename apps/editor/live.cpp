@@ -119,7 +119,6 @@ void LiveScene::start(const Scene& scene, std::uint64_t goal) {
     next_drawn_ = scene;
     next_number_ = ++scenes_;
     goal_ = goal;
-    clear_ = false;
     status_.failure.clear();
     draw_failure_.clear();
     simulation_due_.notify_all();
@@ -249,6 +248,7 @@ void LiveScene::fail(const std::string& what) {
     status_.failure = what;
     goal_ = status_.step;
     forget_simulation();
+    drawing_due_.notify_all();  // the last picture gets its detail
 }
 
 void LiveScene::forget_simulation() {
@@ -272,7 +272,8 @@ void LiveScene::simulate() {
             forget_simulation();
             rows_.clear();
             ++status_.rows_version;
-            status_.step = status_.steps_taken = goal_ = 0;
+            status_.step = status_.steps_taken = 0;
+            if (!new_scene_) goal_ = 0;
             frame_.reset();  // a step was under way
             picture_.reset();
             continue;

@@ -114,6 +114,19 @@ std::vector<SunKey> changed_sun(const Scene& scene, SunKey wanted, std::uint64_t
     return keys;
 }
 
+// Key frames of a sun that is `wanted` at a step, and as in `scene` at the other key frames.
+std::vector<SunKey> sun_with_key(const Scene& scene, SunKey wanted, std::uint64_t step) {
+    wanted.time_s = double(step) * scene.automaton.time_step_s;
+    std::vector<SunKey> keys = scene.sun_path;
+    const auto at = std::ranges::lower_bound(keys, wanted.time_s, {}, &SunKey::time_s);
+    if (at != keys.end() && at->time_s == wanted.time_s) {
+        *at = wanted;
+    } else {
+        keys.insert(at, wanted);
+    }
+    return keys;
+}
+
 // The text with other key frames of the sun; those that stay are not touched, nor what their author wrote beside them.
 std::string with_sun_keys(std::string text, const Scene& scene, const std::vector<SunKey>& keys) {
     for (const char* key : {"sun.date", "sun.time", "sun.moves", "sun.latitude_deg", "sun.longitude_deg"})
@@ -145,7 +158,9 @@ void record_sun(Editor& editor, const SunKey& wanted) {
     const std::uint64_t step = shown_step(editor);
     const Scene& scene = *editor.shown_scene;
     const auto changed = [&](const std::string& text) {
-        return with_sun_keys(text, scene, changed_sun(scene, wanted, step));
+        const bool adds_one = !editor.record && !scene.sun_path.empty();
+        return with_sun_keys(text, scene,
+                             adds_one ? sun_with_key(scene, wanted, step) : changed_sun(scene, wanted, step));
     };
     // One drag is one step of the history, over as many steps of the simulation as it lasts.
     if (change_text(editor, changed, "Sun from step " + std::to_string(step), "live sun"))

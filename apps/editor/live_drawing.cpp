@@ -28,8 +28,10 @@ struct Artist {
         failure.clear();
         try {
             if (!painter) painter = std::make_unique<FramePainter>(scene, device);
+            const bool paints =
+                view.mode != kWireframe && view.mode != kVoxels;  // the others leave the painter as it is
             const bool same = painted_simulation == frame->simulation_number;
-            painted_simulation = frame->simulation_number;
+            if (paints) painted_simulation = frame->simulation_number;
             std::shared_ptr<LivePicture> made = maker.draw(*painter, scene, frame, view, refine, same);
             device_name = painter->device_name();
             return made;

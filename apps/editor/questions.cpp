@@ -71,11 +71,11 @@ void take_edits(Editor& editor, const LeftAutosave& found) {
     if (found.scene != editor.document->title()) {
         auto copy = std::make_unique<SceneDocument>(editor.document->saved_text(), found.scene,
                                                     editor.document->folder());
+        copy->take_autosave(found);
         if (!add_scene(editor, std::move(copy))) return;
-        std::erase_if(editor.left_autosaves,
-                      [&](const LeftAutosave& one) { return one.path == found.path; });  // it is being taken
+    } else {
+        editor.document->take_autosave(found);
     }
-    editor.document->take_autosave(found);
     say(editor, "Edits recovered; save to keep them, undo to go back");
 }
 

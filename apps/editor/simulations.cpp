@@ -51,7 +51,8 @@ std::string unused_title(Editor& editor, const std::filesystem::path& title) {
             title.stem().string() + "-" + std::to_string(number) + title.extension().string();
         bool taken = false;
         for_each_scene(editor, [&](const OpenScene& scene) { taken |= scene.document->title() == name; });
-        if (!taken) return name;
+        std::error_code error;  // nor a file beside it, whose edits those of a copy would be taken for
+        if (!taken && !std::filesystem::exists(editor.document->folder() / name, error)) return name;
     }
 }
 

@@ -171,7 +171,7 @@ double largest_error(VoxelType type) {
         case VoxelType::r32f:
             break;
     }
-    return 1e-7;
+    return 0x1p-22;  // scaled, and scaled back: three roundings
 }
 
 }  // namespace nephos

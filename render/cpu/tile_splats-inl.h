@@ -134,14 +134,15 @@ HWY_INLINE float distance_of(const ScreenBall& ball, const ViewScene& scene) {
                               : scene.exact[std::bit_cast<std::uint32_t>(ball.x)].distance;
 }
 
-// Hides the pixels of a tile from splats beyond ground that is not level: their transmittance is 0 while one is drawn.
+// Hides the pixels of a tile from splats beyond ground that is not level: their transmittance is 0 while one is drawn. The
+// plane hides none, as without terrain.
 class TerrainMask {
   public:
-    TerrainMask(const PictureFrame& frame, const TileRays& rays)
-        : rays_(rays), any_(frame.terrain != nullptr) {
+    TerrainMask(const PictureFrame& frame, const TileRays& rays) : any_(frame.terrain != nullptr) {
         if (!any_) return;
-        nearest_ = *std::min_element(rays.ground, rays.ground + kTilePixels);
-        farthest_ = *std::max_element(rays.ground, rays.ground + kTilePixels);
+        for (std::size_t n = 0; n < kTilePixels; ++n) end_[n] = rays.open[n] > 0 ? kNowhere : rays.ground[n];
+        nearest_ = *std::min_element(end_, end_ + kTilePixels);
+        farthest_ = *std::max_element(end_, end_ + kTilePixels);
     }
     // Whether all pixels end before a distance, so that nothing beyond it is seen.
     bool ends_before(float distance_m) const { return any_ && farthest_ < distance_m; }
@@ -151,23 +152,23 @@ class TerrainMask {
         for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(d)) {
             const Floats left = hn::Load(d, sums.transmittance + at);
             hn::Store(left, d, before_ + at);
-            const auto seen = hn::Ge(hn::Load(d, rays_.ground + at), set(distance_m));
+            const auto seen = hn::Ge(hn::Load(d, end_ + at), set(distance_m));
             hn::Store(hn::IfThenElseZero(seen, left), d, sums.transmittance + at);
         }
     }
     void show(float distance_m, TileSums& sums) const {
         const Lanes d;
         for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(d)) {
-            const auto seen = hn::Ge(hn::Load(d, rays_.ground + at), set(distance_m));
+            const auto seen = hn::Ge(hn::Load(d, end_ + at), set(distance_m));
             const Floats now = hn::Load(d, sums.transmittance + at);
             hn::Store(hn::IfThenElse(seen, now, hn::Load(d, before_ + at)), d, sums.transmittance + at);
         }
     }
 
   private:
-    const TileRays& rays_;
     bool any_;
     float nearest_ = 0, farthest_ = 0;
+    HWY_ALIGN float end_[kTilePixels];  // distances of terrain; kNowhere where there is none
     HWY_ALIGN float before_[kTilePixels] = {};
 };
 

@@ -107,14 +107,14 @@ class Reader {
     Metar finished() {
         if (metar_.cavok && (!metar_.clouds.empty() || !metar_.weather.empty())) {
             const auto excluded = std::ranges::find_if(metar_.groups, [](const MetarGroup& group) {
-                return group.meaning.starts_with("cloud") || group.meaning.starts_with("weather") ||
-                       group.meaning.starts_with("sky obscured");
+                return (group.meaning.starts_with("cloud") && group.meaning != "clouds unknown") ||
+                       group.meaning.starts_with("weather") || group.meaning.starts_with("sky obscured");
             });
             std::string caret;
             if (excluded != metar_.groups.end())
                 caret = "\n  " + std::string(excluded->column, ' ') + std::string(excluded->text.size(), '^');
-            throw Error(ErrorCode::usage,
-                        "CAVOK excludes clouds and weather, but the report has them:\n  " + metar_.text + caret);
+            throw Error(ErrorCode::usage, "CAVOK excludes clouds and weather, but the report has them:\n  " +
+                                              metar_.text + caret);
         }
         return std::move(metar_);
     }
@@ -343,7 +343,8 @@ class Reader {
 
     void check_clouds() const {
         if (metar_.clouds.size() >= kMostClouds)
-            fail("the report has " + std::to_string(kMostClouds) + " groups of clouds already, the most that are read");
+            fail("the report has " + std::to_string(kMostClouds) +
+                 " groups of clouds already, the most that are read");
     }
 
     // 14/08, M02/M05, 14///, 14/, /////.

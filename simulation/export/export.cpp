@@ -302,11 +302,11 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                                 stopped = progress && !progress(done, frames);
                                 return !stopped;
                             });
+                work.finish();
             } catch (...) {
                 work.finish_quietly();
                 throw;
             }
-            work.finish();
             if (progress && !stopped) progress(done, frames);
             lock.require_in_place();
             if (stopped) {

@@ -15,6 +15,7 @@
 #include "density/metaballs.h"
 #include "render/renderer.h"
 #include "render/terrain/height_map.h"
+#include "tests/render/random_billboards.h"
 #include "tests/render/renderer_test_access.h"
 #include "tests/render/shared_renderers.h"
 
@@ -111,7 +112,26 @@ TEST(TerrainPicture, BackendsAgree) {
     }
 }
 
-// Pictures in parts.
+// Billboards before and behind the wall, through it where their clouds stand in it, and pictures in parts.
+TEST(TerrainPicture, BackendsAgreeAboutBillboards) {
+    for (const double y : {1500.0, 3000.0, 5000.0}) {
+        std::vector<CloudBillboard> billboards = test::random_billboards(4, 120, 1);
+        for (CloudBillboard& each : billboards) each.centre_m = each.centre_m + Vec3{0, y, -700};
+        const std::vector<BillboardCloud> clouds{{{0, y, 300}, -100, 700}};
+        Splats splats = test::scene_of(clouds, billboards);
+        splats.terrain = wall();
+        const auto drawn = [&](Splatting way) { return test::renderer(way).draw_splats(splats, view()); };
+        const Picture processor = drawn(Splatting::cpu);
+        EXPECT_LE(difference(processor, drawn(Splatting::vulkan)), 1.0 / 255) << y;
+        EXPECT_LE(difference(processor, drawn(Splatting::blended)), 1.0 / 255) << y;
+        Splats open = splats;
+        open.terrain = nullptr;
+        if (y == 5000) {  // the wall hides some
+            EXPECT_GT(difference(processor, test::renderer().draw_splats(open, view())), 0.05);
+        }
+    }
+}
+
 TEST(TerrainPicture, PartsDoNotShow) {
     RenderOptions options = view();
     options.atmosphere.model = AirModel::physical;

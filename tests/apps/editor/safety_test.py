@@ -115,8 +115,8 @@ class Safety(Case):
         self.assertEqual(other.read_text(encoding="utf-8"), MODELS)
 
     def test_a_dialog_that_is_cancelled_answers_nothing(self):
-        """Open beside, cancelled: closing asks about unsaved edits as before. Keys do nothing while it asks, and a
-        "Go back" at a later question takes the answers of before back."""
+        """Open beside, cancelled: closing asks about unsaved edits as before. Keys do nothing while it asks: a new scene does not
+        take the place of the end."""
         scene = self.models()
         self.edit(scene, "--validation", script="""
             wait-step 1
@@ -133,11 +133,13 @@ class Safety(Case):
             expect-control "unsaved models.toml"
             click "Go on editing"
             wait 0.3
+            key CTRL+Q
+            wait 0.3
             key CTRL+N
             wait 0.3
-            expect-control "unsaved models.toml"
             click "Save them"
             wait 0.5
+            expect-control "is not reached: it has ended"
             """)
         self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
 
