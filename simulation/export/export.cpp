@@ -263,6 +263,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());
     const auto take = [&](const ExportSequence& s, std::vector<FrameFigures>& of, ExportedFrame&& frame) {
+        if (!frame.note.empty()) notes.push_back(std::move(frame.note));
         for (ExportedFile& file : frame.kept) list.add_kept(std::move(file));
         for (ExportedFile& file : frame.written) list.add_written(std::move(file));
         if (frame.figures.max > s.scale && cuts_values(options))

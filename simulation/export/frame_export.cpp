@@ -68,7 +68,7 @@ void write_vdb_file(const std::filesystem::path& path, const ExportOptions& opti
 // Returns whether the VDB file of a frame would have the grid and metadata of its source: then its bytes are copied.
 bool is_copy(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
              const ExportSource& source) {
-    return frame.plain && *frame.plain == source.digest && s.layout.factor == 1 &&
+    return frame.is_plain && frame.listed == source.digest && s.layout.factor == 1 &&
            !options.half_voxel_shift && options.velocity_name.empty() && options.type != VoxelType::r16f;
 }
 
@@ -135,7 +135,11 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
     require_unchanged(frame);
     std::map<VoxelType, EncodedVolume> encoded;
     std::vector<Volume> levels;
-    ExportedFrame result{{loaded.density.sum(), double(loaded.density.max_value())}, {}, {}};
+    ExportedFrame result{{loaded.density.sum(), double(loaded.density.max_value())}, {}, {}, {}};
+    if (frame.listed && frame.listed != source.digest)
+        result.note = frame.file.string() +
+                      ": is damaged or was changed: it is not the file that the manifest of its run "
+                      "lists (nephos verify compares all of them)";
     for (const ExportFormat format : all_formats(options_)) {
         if (format == ExportFormat::usd) continue;
         const std::string name = frame_name(s, frame.number, format);

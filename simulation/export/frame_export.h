@@ -20,6 +20,7 @@ namespace nephos {
 struct ExportedFrame {
     FrameFigures figures;
     std::vector<ExportedFile> written, kept;
+    std::string note;  // on its source; empty: none
 };
 
 // Writes the files of one frame that are not there yet. Thread-safe for different frames.

@@ -52,11 +52,8 @@ std::vector<WindTable> wind_of(const Scene& scene, std::optional<std::size_t> la
     return tables;
 }
 
-// The digest of a file that has no grid but its density, of 32-bit floats.
-std::optional<FileDigest> plain_digest(const RunListing& run, const ListedFrame& frame,
-                                       const std::filesystem::path& file) {
-    const DensityOptions& density = run.scene.density;
-    if (density.half || density.write_state || density.write_velocity) return {};
+std::optional<FileDigest> listed_digest(const RunListing& run, const ListedFrame& frame,
+                                        const std::filesystem::path& file) {
     for (const FileRecord& record : frame.files)
         if (run.folder / record.path == file) return record.digest;
     return {};
@@ -77,17 +74,20 @@ void read_first(const ExportOptions& options, ExportSequence& s) {
 ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& run,
                                const std::optional<std::string>& layer) {
     if (run.frames.empty())
-        throw Error(ErrorCode::usage, run.folder.string() +
-                                          ": has no frames to export: it was run with --statistics-only, or ended "
-                                          "before its first frame");
+        throw Error(ErrorCode::usage,
+                    run.folder.string() +
+                        ": has no frames to export: it was run with --statistics-only, or ended "
+                        "before its first frame");
     ExportSequence s;
     s.name = run.scene.name + (layer ? "_" + *layer : "");
     s.layer = layer.value_or("");
+    const DensityOptions& density = run.scene.density;
+    const bool is_plain = !density.half && !density.write_state && !density.write_velocity;
     for (const ListedFrame& frame : run.frames) {
         if (!is_wanted(options, frame.number, 1)) continue;
         const std::filesystem::path file = density_file(run, frame, layer);
         s.frames.push_back({file, frame.number, frame.time_s, utc_at(run.scene.georeference, frame.time_s),
-                            stamp_of(file), plain_digest(run, frame, file)});
+                            stamp_of(file), listed_digest(run, frame, file), is_plain});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, run.folder.string() + ": has no frame of this range");
     read_first(options, s);

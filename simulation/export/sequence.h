@@ -30,8 +30,8 @@ struct SourceFrame {
     double time_s = 0;
     std::string utc;    // empty without a start
     FileStamp stamp{};  // when it was listed, before its voxels were read
-    // Of a run's file that holds nothing but its density as 32-bit floats: what its manifest says of its bytes.
-    std::optional<FileDigest> plain{};
+    std::optional<FileDigest> listed{};  // of a run's file: what its manifest says of its bytes
+    bool is_plain = false;               // the file holds nothing but its density as 32-bit floats
 };
 
 // A moment and the wind by height at it.

@@ -364,6 +364,17 @@ class Export(Case):
         self.assertEqual(report["kept"], 3)
         self.call("verify", "out")
 
+    def test_a_file_that_the_manifest_does_not_list_is_named(self):
+        """Bits of voxels that were flipped, in a file that can be read: each export says that it is not the run's."""
+        path = self.folder / "run/density/placed_0003.vdb"
+        whole = path.read_bytes()
+        path.write_bytes((self.folder / "run/density/placed_0002.vdb").read_bytes())
+        for number, arguments in enumerate((["--to", "raw"], ["--to", "vdb"], ["--for", "blender"])):
+            said = self.call("export", "run", *arguments, "-o", f"noted-{number}").stderr
+            self.assertEqual(said.count("is damaged or was changed"), 1, said)
+            self.assertIn("placed_0003.vdb: is damaged or was changed", said)
+        path.write_bytes(whole)
+
     def test_one_export_at_a_time(self):
         import fcntl
         folder = self.export("out", "--to", "raw")
