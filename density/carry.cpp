@@ -160,7 +160,7 @@ class Carrier {
                     if (z >= levels || !reaches(origin, i, j, z)) out[std::size_t(leaf_offset(i, j, z))] = 0;
     }
 
-    // Whether the state reaches a voxel of a block; an open side extends by one voxel.
+    // Returns whether the state reaches a voxel of a block; an open side extends by one voxel.
     bool reaches(const Coord& origin, int i, int j, int z) const {
         const auto k = std::size_t(origin.z() + z);
         return reaches(x_[k], origin.x() + i, extent_.x, boundaries_.x) &&

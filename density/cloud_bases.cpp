@@ -93,7 +93,7 @@ CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m, cons
                 for (const int dx : {0, 1}) {
                     const double part = (dx == 0 ? across.in_first : 1 - across.in_first) *
                                         (dy == 0 ? up.in_first : 1 - up.in_first);
-                    // What rounding puts beyond the last texel is none.
+                    // Rounding may name a texel beyond the last one: it has no part.
                     if (part < 1e-9 || across.first + dx >= bases.columns || up.first + dy >= bases.rows) continue;
                     const std::size_t texel = std::size_t(up.first + dy) * std::size_t(bases.columns) +
                                               std::size_t(across.first + dx);

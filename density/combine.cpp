@@ -113,7 +113,7 @@ struct Neighbours {
     }
 };
 
-// What a block of the common box reads of a grid along an axis: its voxels, and for each voxel of the block its two
+// Tells what a block of the common box reads of a grid along an axis: its voxels, and for each voxel of the block its two
 // neighbours as indices of these.
 struct BlockAxis {
     std::vector<int> voxels;

@@ -32,6 +32,33 @@ double fastest_m_per_s(const Wind& wind) {
     return fastest;
 }
 
+constexpr double kLeastLeft = 1e-30;  // of the light, so that depths stay finite
+
+// What clouds take of the light in the voxels that they drive.
+AddedDepth depth_in_voxels(std::span<const SkyLayer> layers, const Sun& sun, double time_s) {
+    std::vector<AbsorbingCloud> clouds;
+    for (const SkyLayer& layer : layers) {
+        if (layer.voxels == nullptr) continue;
+        const WorldRectangle& world = layer.sky->options().world;
+        const Boundaries& sides = layer.voxels->boundaries;
+        const ParcelLight light{layer.voxels->light_absorption,
+                                {sides.x == Boundary::periodic ? world.max_x_m - world.min_x_m : 0,
+                                 sides.y == Boundary::periodic ? world.max_y_m - world.min_y_m : 0}};
+        append_absorbing(clouds, *layer.sky, layer.clouds, layer.voxels->coupling, light, time_s);
+    }
+    const auto absorption = std::make_shared<const ParcelAbsorption>(clouds, direction_to_sun(sun));
+    if (absorption->empty()) return {};
+    const std::vector<double> content = absorption->content();
+    const StateHash hash = hash_of_bytes(std::as_bytes(std::span(content)));
+    AddedDepth depth;
+    depth.key = {hash.high, hash.low};
+    depth.at = [absorption](const Vec3& place_m) {
+        const double left = absorption->sunlight_at(place_m);
+        return left < 1 ? float(-std::log(std::max(left, kLeastLeft))) : 0.0f;
+    };
+    return depth;
+}
+
 }  // namespace
 
 Light light_of(const Sun& sun) { return {direction_to_sun(sun), true}; }
@@ -181,37 +208,6 @@ std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyC
     for (const FormedCloud& each : unseen) list_unseen(sky, each, time_s, out);
     return computed;
 }
-
-namespace {
-
-constexpr double kLeastLeft = 1e-30;  // of the light, so that depths stay finite
-
-// What clouds take of the light in the voxels that they drive.
-AddedDepth depth_in_voxels(std::span<const SkyLayer> layers, const Sun& sun, double time_s) {
-    std::vector<AbsorbingCloud> clouds;
-    for (const SkyLayer& layer : layers) {
-        if (layer.voxels == nullptr) continue;
-        const WorldRectangle& world = layer.sky->options().world;
-        const Boundaries& sides = layer.voxels->boundaries;
-        const ParcelLight light{layer.voxels->light_absorption,
-                                {sides.x == Boundary::periodic ? world.max_x_m - world.min_x_m : 0,
-                                 sides.y == Boundary::periodic ? world.max_y_m - world.min_y_m : 0}};
-        append_absorbing(clouds, *layer.sky, layer.clouds, layer.voxels->coupling, light, time_s);
-    }
-    const auto absorption = std::make_shared<const ParcelAbsorption>(clouds, direction_to_sun(sun));
-    if (absorption->empty()) return {};
-    const std::vector<double> content = absorption->content();
-    const StateHash hash = hash_of_bytes(std::as_bytes(std::span(content)));
-    AddedDepth depth;
-    depth.key = {hash.high, hash.low};
-    depth.at = [absorption](const Vec3& place_m) {
-        const double left = absorption->sunlight_at(place_m);
-        return left < 1 ? float(-std::log(std::max(left, kLeastLeft))) : 0.0f;
-    };
-    return depth;
-}
-
-}  // namespace
 
 Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
                          const RenderOptions& moving, double time_s, bool depth,

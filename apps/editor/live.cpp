@@ -52,6 +52,10 @@ struct Collector : SimulationSink {
     std::optional<FrameResult> last;
 };
 
+std::size_t bytes_of(const Checkpoint& checkpoint) {
+    return checkpoint.automaton.size() + checkpoint.history.size();
+}
+
 }  // namespace
 
 FrameOptions film_of_steps(const Scene& scene) {
@@ -79,12 +83,6 @@ SceneChange change_between(const Scene& before, const Scene& after) {
     }
     return same == after ? SceneChange::picture : SceneChange::simulation;
 }
-
-namespace {
-std::size_t bytes_of(const Checkpoint& checkpoint) {
-    return checkpoint.automaton.size() + checkpoint.history.size();
-}
-}  // namespace
 
 LiveScene::LiveScene(DeviceOptions device) : device_(std::move(device)) {
     simulation_thread_ = std::thread([this] { simulate(); });

@@ -47,7 +47,7 @@ struct Artist {
 
 void yield_to_window(int steps) { ::setpriority(PRIO_PROCESS, 0, ::getpriority(PRIO_PROCESS, 0) + steps); }
 
-// What is to be drawn.
+// Holds what a thread draws without the mutex.
 struct LiveScene::Shown {
     std::shared_ptr<const LiveFrame> frame;
     LiveView view;

@@ -57,7 +57,7 @@ std::string label_of(const Node& element, const Key& list, std::size_t index) {
     return element_name(list.name) + " " + std::to_string(index + 1);
 }
 
-// What is chosen in the outline has its keys in the properties.
+// Chooses what the outline shows, and brings its keys to the front in the properties.
 void choose(Editor& editor, const TextPath& path) {
     editor.selected = path;
     editor.wanted_tab = 0;

@@ -28,6 +28,19 @@ std::string time_text(fs::file_time_type time) {
     return text;
 }
 
+// Takes the edits that an ended session left, into the scene, or those of a copy of it into a simulation beside it.
+void take_edits(Editor& editor, const LeftAutosave& found) {
+    if (found.scene != editor.document->title()) {
+        auto copy = std::make_unique<SceneDocument>(editor.document->saved_text(), found.scene,
+                                                    editor.document->folder());
+        copy->take_autosave(found);
+        if (!add_scene(editor, std::move(copy))) return;
+    } else {
+        editor.document->take_autosave(found);
+    }
+    say(editor, "Edits recovered; save to keep them, undo to go back");
+}
+
 }  // namespace
 
 void unsaved_dialog(Editor& editor) {
@@ -63,23 +76,6 @@ void unsaved_dialog(Editor& editor) {
     }
     ImGui::EndPopup();
 }
-
-namespace {
-
-// Takes the edits that an ended session left, into the scene, or those of a copy of it into a simulation beside it.
-void take_edits(Editor& editor, const LeftAutosave& found) {
-    if (found.scene != editor.document->title()) {
-        auto copy = std::make_unique<SceneDocument>(editor.document->saved_text(), found.scene,
-                                                    editor.document->folder());
-        copy->take_autosave(found);
-        if (!add_scene(editor, std::move(copy))) return;
-    } else {
-        editor.document->take_autosave(found);
-    }
-    say(editor, "Edits recovered; save to keep them, undo to go back");
-}
-
-}  // namespace
 
 // One file after the other; what the user decides is done to the file that was found, or said to be gone.
 void recovery_dialog(Editor& editor) {

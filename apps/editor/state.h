@@ -334,10 +334,10 @@ void slice_over_picture(Editor& editor);
 // live_changes.cpp: writes a change of a key that was made while the scene runs as key frames at the present step;
 // `edited`: the text as it would be without recording. Returns false for keys that cannot be recorded.
 bool record_live(Editor& editor, const TextPath& path, const std::string& edited);
-// Whether a change of a key is to be recorded: while the user records, and always of a sun with key frames, which
+// Returns whether a change of a key is to be recorded: while the user records, and always of a sun with key frames, which
 // stand in the place of the key.
 bool is_recorded(const Editor& editor, const TextPath& path);
-// The value of a key that key frames stand for, at the step that is shown; nothing for other keys.
+// Returns the value of a key that key frames stand for, at the step that is shown; nothing for other keys.
 std::optional<std::string> value_now(const Editor& editor, const TextPath& path);
 // Moves the sun: from the present step on when that is_recorded(), otherwise for good.
 void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dragging);

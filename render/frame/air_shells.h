@@ -78,7 +78,7 @@ std::size_t shells_before(const shader::Shells& data, float distance);
 // sample the whole shadow map.
 bool has_shells(const RenderOptions& options, bool casts_shadow);
 
-// What of a cloud's light the shells are made of.
+// Holds the sunlight that the shells are made of.
 struct AirLight {
     const ShadowFrame& frame;
     std::span<const float> shadow;  // the shadow map, or empty: its plane of AirShells::shade is left 0

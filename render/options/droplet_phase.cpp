@@ -67,7 +67,7 @@ std::array<double, 3> rgb_of_wavelength(double nm) {
             0.0557 * x - 0.2040 * y + 1.0570 * z};
 }
 
-// Of the gamma distribution, relative to its value at the effective radius.
+// Returns the gamma distribution of radii at one of them, relative to its value at the effective radius.
 double number_of(const DropletSizes& sizes, double radius_um) {
     const double variance = sizes.effective_variance,
                  radius = radius_um / (0.5 * sizes.effective_diameter_um);

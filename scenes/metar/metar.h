@@ -11,6 +11,8 @@
 
 namespace nephos {
 
+inline constexpr double kKnot = 1852.0 / 3600;  // metres a second
+
 enum class CloudAmount { few, scattered, broken, overcast, obscured, unknown };  // obscured: VV
 
 struct MetarCloud {

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/bytes.h"
+#include "scenes/metar/metar.h"
 #include "simulation/export/weather.h"
 
 namespace nephos {
@@ -18,7 +19,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kKnot = 1852.0 / 3600;
 constexpr std::uint16_t kCigiRegion = 1;
 
 // X-Plane's types: 0 cirrus, 1 stratus, 2 cumulus, 3 cumulonimbus.

@@ -41,30 +41,10 @@ void parse(const std::filesystem::path& path, const Parse& parser) {
     });
 }
 
-// A name with an ending, for one file in memory after the other.
-class RawName {
-  public:
-    RawName() {
-        char name[] = "/tmp/nephos-fuzz-XXXXXX";
-        fuzz::require(mkdtemp(name) != nullptr, "mkdtemp");
-        folder_ = name;
-    }
-    ~RawName() { std::filesystem::remove_all(folder_); }
-    std::filesystem::path of(const std::filesystem::path& file) const {
-        const std::filesystem::path link = folder_ / "input.raw";
-        std::filesystem::remove(link);
-        std::filesystem::create_symlink(file, link);
-        return link;
-    }
-
-  private:
-    std::filesystem::path folder_;
-};
-
 }  // namespace
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    static const RawName name;
+    static const fuzz::Names names;
     static const bool prepared = (prepare_exr(), true);
     fuzz::require(prepared, "OpenEXR is ready");
     const fuzz::InputFile file(fuzz::as_text(data, size));
@@ -79,7 +59,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
         check(grid.columns, grid.rows, grid.values);
     });
     fuzz::accepts([&] {
-        const HeightFile read = read_height_file(name.of(file.path()), kColumns, kRows);
+        const HeightFile read = read_height_file(names.of(file, ".raw"), kColumns, kRows);
         fuzz::require(!read.metres && read.image.columns == kColumns && read.image.rows == kRows,
                       "the size it was given");
         check(read.image.columns, read.image.rows, read.image.heights);

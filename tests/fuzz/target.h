@@ -70,4 +70,24 @@ class InputFile {
     int fd_;
 };
 
+// Names with an ending, as a reader wants them, for one file in memory after the other.
+class Names {
+  public:
+    Names() {
+        std::string name = (std::filesystem::temp_directory_path() / "nephos-fuzz-XXXXXX").string();
+        require(mkdtemp(name.data()) != nullptr, "mkdtemp");
+        folder_ = name;
+    }
+    ~Names() { std::filesystem::remove_all(folder_); }
+    std::filesystem::path of(const InputFile& file, const char* ending) const {
+        const std::filesystem::path link = folder_ / (std::string("input") + ending);
+        std::filesystem::remove(link);
+        std::filesystem::create_symlink(file.path(), link);
+        return link;
+    }
+
+  private:
+    std::filesystem::path folder_;
+};
+
 }  // namespace nephos::fuzz
