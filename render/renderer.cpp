@@ -15,13 +15,9 @@
 #include "render/blended/blended_backend.h"
 #include "render/cpu/cpu_backend.h"
 #include "render/frame/frame_data.h"
-#include "render/frame/marched_scene.h"
 #include "render/frame/scattering_table.h"
 #include "render/ground/wet_ground.h"
 #include "render/renderer_impl.h"
-#include "render/terrain/terrain_edges.h"
-#include "render/terrain/terrain_pass.h"
-#include "render/veil/veil_pass.h"
 #include "render/veil/veil_shade.h"
 #include "render/vulkan/vulkan_backend.h"
 
@@ -66,22 +62,6 @@ decltype(auto) with_drawing_errors(Work&& work) {
     } catch (const std::bad_alloc&) {
         throw Error(ErrorCode::usage, "not enough memory for a picture of this size");
     }
-}
-
-CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats, std::span<const DrawnVeil> veils) {
-    CloudHeights heights{cloud.base_m, cloud.top_m};
-    bool some = !cloud.visible.empty();
-    for (const BillboardCloud& each : splats.clouds) {
-        heights.base_m = some ? std::min(heights.base_m, each.base_m) : each.base_m;
-        heights.top_m = some ? std::max(heights.top_m, each.top_m) : each.top_m;
-        some = true;
-    }
-    for (const DrawnVeil& veil : veils) {
-        heights.base_m = some ? std::min(heights.base_m, veil.slab->base_m()) : veil.slab->base_m();
-        heights.top_m = some ? std::max(heights.top_m, veil.slab->top_m()) : veil.slab->top_m();
-        some = true;
-    }
-    return heights;
 }
 
 // The back-end that options ask for.
@@ -202,8 +182,28 @@ void Renderer::Impl::begin(Drawing& drawing) {
             if (!lit.volumes.empty()) use_ground_light(lit.ground_light, options.camera.position_m, part);
         }
     }
+    std::optional<GroundPass> ground;
+    if (drawing.with_ground) {
+        WetGround what{options, cover_of(splats), flash, splats.time_s, drawing.mirror ? &*drawing.mirror : nullptr};
+        what.sky = frame.sky;
+        frame.ground = &ground.emplace(ground_pass(what, lit.frame));
+    }
+    frame.shows_kept = drawing.shows_kept;
+    frame.keeps = drawing.keeps;
     if (backend->begin(frame, picture)) drawing.backend = backend.get();
     if (splats.light) hand_out_light(splats, options, picture);
+}
+
+void Renderer::Impl::begin_picture(Drawing& drawing, std::optional<Rainfall> rain) {
+    const bool by_host = !veils.empty() || drawing.splats.terrain != nullptr;
+    if (by_host || (!add_ground(drawing) && shows_ground(drawing.options, cover_of(drawing.splats)))) {
+        drawing.picture = draw_in_passes(drawing);
+        drawing.rain = std::move(rain);
+        begin_rain(drawing, true);
+    } else {
+        drawing.rain = std::move(rain);
+        begin(drawing);
+    }
 }
 
 void Renderer::Impl::finish(Drawing& drawing) {
@@ -232,13 +232,9 @@ void Renderer::Impl::begin_rain(Drawing& drawing, bool known) {
         painter.draw(picture, rain.options, rain.weather, rain.time_s);
 }
 
-Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options, const DetailView& detail,
-                             TerrainView& terrain) {
-    Drawing drawing(splats, options);
-    drawing.detail = detail;
+Picture Renderer::Impl::draw(Drawing& drawing) {
     begin(drawing);
     finish(drawing);
-    terrain = std::move(drawing.terrain);
     return std::move(drawing.picture);
 }
 
@@ -272,94 +268,6 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
         cache_ground_light(lit, options);
         picture.ground_light = lit.ground_light;
     }
-}
-
-Picture Renderer::Impl::draw_in_passes(const Splats& splats, const RenderOptions& options) {
-    const CameraFrame camera = camera_frame(options.camera);
-    const DetailView detail{camera.position_m, pixels_per_unit(options.camera, camera)};
-    TerrainView terrain;
-    Picture picture = draw(splats, options, detail, terrain);
-    static const GroundCoverView kDry;
-    const GroundCoverView& cover = splats.ground_cover ? *splats.ground_cover : kDry;
-    const std::optional<MirrorView> mirror = mirror_of(splats, options, cover, detail);
-    const MirrorView* const mirrored = mirror ? &*mirror : nullptr;
-    if (splats.terrain != nullptr)
-        draw_terrain_of(splats, options, cover, detail, terrain, mirrored, picture);
-    if (shows_wet_ground(options, cover) || shows_pattern(options))
-        draw_ground(splats, options, cover, detail, mirrored, picture);
-    if (!veils.empty()) draw_veils_of(splats, options, detail, picture);
-    if (splats.terrain != nullptr)
-        smooth_edges(*splats.terrain, options, double(earth_bend(sky_of(splats, options))), terrain, picture);
-    return picture;
-}
-
-std::optional<MirrorView> Renderer::Impl::mirror_of(const Splats& splats, const RenderOptions& options,
-                                                    const GroundCoverView& cover, const DetailView& detail) {
-    if (!shows_reflections(options, cover)) return std::nullopt;
-    RenderOptions below = options;
-    below.camera = mirrored_camera(options);
-    // Waves make a glint of the sun.
-    if (options.ground.pattern == GroundPattern::water) below.atmosphere.sun_disc = false;
-    Splats mirrored = splats;
-    mirrored.depth = !veils.empty();
-    mirrored.light = false;
-    // The merged metaballs are reused, and with them the light.
-    TerrainView terrain;
-    Picture view = draw(mirrored, below, detail, terrain);
-    if (splats.terrain != nullptr) draw_terrain_of(splats, below, cover, detail, terrain, nullptr, view);
-    if (!veils.empty()) draw_veils_of(splats, below, detail, view);
-    return mirror_view(std::move(view), below.camera);
-}
-
-void Renderer::Impl::draw_terrain_of(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
-                                     const DetailView& detail, const TerrainView& view, const MirrorView* mirror,
-                                     Picture& picture) {
-    backend->fetch_light(lit);
-    const CloudHeights clouds = heights_of(lit.cloud, splats, {});
-    TerrainGround ground{options, *splats.terrain, view, cover, splats.flash ? &*splats.flash : nullptr, splats.time_s, mirror};
-    ground.shadow = lit.shadow.data();
-    ground.shadow_size = lit.shadow_size;
-    ground.sky = sky_of(splats, options);
-    const MarchedScene marched(lit.volumes, camera_frame(options.camera), detail.pixels_per_unit, options.light,
-                               earth_bend(ground.sky));
-    if (marched.repeats) ground.endless = &marched;
-    if (!lit.volumes.empty()) ground.light = &lit.ground_light;
-    ground.cloud_base_m = clouds.base_m;
-    ground.cloud_top_m = clouds.top_m;
-    draw_terrain(ground, picture);
-}
-
-void Renderer::Impl::draw_ground(const Splats& splats, const RenderOptions& options,
-                                 const GroundCoverView& cover, const DetailView& detail, const MirrorView* mirror,
-                                 Picture& picture) {
-    WetGround ground{options, cover, splats.flash ? &*splats.flash : nullptr, splats.time_s, mirror};
-    backend->fetch_light(lit);
-    ground.shadow = lit.shadow.data();  // the mirrored view may have completed it
-    ground.shadow_size = lit.shadow_size;
-    ground.sky = sky_of(splats, options);  // the mirrored view has another
-    const MarchedScene marched(lit.volumes, camera_frame(options.camera), detail.pixels_per_unit,
-                               options.light, earth_bend(ground.sky));
-    if (marched.repeats) ground.endless = &marched;
-    if (!lit.volumes.empty()) ground.light = &lit.ground_light;
-    draw_wet_ground(ground, picture);
-}
-
-void Renderer::Impl::draw_veils_of(const Splats& splats, const RenderOptions& options,
-                                   const DetailView& detail, Picture& picture) {
-    backend->fetch_light(lit);
-    const CameraFrame camera = camera_frame(options.camera);
-    const SkyLight* const sky = sky_of(splats, options);
-    const PicturePart whole{0, 0, picture.width, picture.height};
-    VeilPass pass{veils,
-                  frame_data(options, camera, lit.frame, splats.flash ? &*splats.flash : nullptr, whole, sky),
-                  camera.position_m,
-                  options.ground.albedo,
-                  lit.shadow.data(),
-                  lit.shadow_size};
-    const MarchedScene marched(lit.volumes, camera, detail.pixels_per_unit, options.light, earth_bend(sky));
-    if (marched.repeats) pass.frame.endless = &marched;
-    if (!lit.volumes.empty()) use_ground_light(lit.ground_light, camera.position_m, pass.frame);
-    draw_veils(pass, picture);
 }
 
 // Null: gradient. Until the next call.
@@ -406,17 +314,9 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
         impl_->times = {};
         impl_->veils = veils;
         impl_->shade_by_veils(splats, options);
-        const bool wet = splats.ground_cover && shows_wet_ground(options, *splats.ground_cover);
-        if (wet || shows_pattern(options) || !veils.empty() || splats.terrain != nullptr) {
-            state->picture = impl_->draw_in_passes(splats, options);
-            state->rain = std::move(rain);
-            impl_->begin_rain(*state, true);
-        } else {
-            state->rain = std::move(rain);
-            const CameraFrame camera = camera_frame(options.camera);
-            state->detail = {camera.position_m, pixels_per_unit(options.camera, camera)};
-            impl_->begin(*state);
-        }
+        const CameraFrame camera = camera_frame(options.camera);
+        state->detail = {camera.position_m, pixels_per_unit(options.camera, camera)};
+        impl_->begin_picture(*state, std::move(rain));
         return PendingPicture(std::move(state));
     };
     return with_drawing_errors(work);

@@ -19,6 +19,9 @@
 
 namespace nephos {
 
+// Returns the heights of all clouds of a picture.
+CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats, std::span<const DrawnVeil> veils);
+
 // A back-end holds the address of `picture` while it is in flight.
 struct PendingPicture::State {
     State(const Splats& what, const RenderOptions& how) : splats(what), options(how) {}
@@ -35,28 +38,43 @@ struct PendingPicture::State {
     TerrainView terrain;  // of ground that is not level
     Backend* backend = nullptr;  // that draws it; null: it is finished
     std::optional<Rainfall> rain;  // still to be drawn
+    bool with_ground = false;      // the back-end draws ground that is not plain and dry, with the view that
+    std::optional<MirrorView> mirror;  // ... the host has of it, or
+    bool shows_kept = false;           // ... that was kept last
+    bool keeps = false;                // this is that view
 };
 
 struct Renderer::Impl {
     explicit Impl(const DeviceOptions& options);
 
     using Drawing = PendingPicture::State;
+    // Begins a picture with all that is drawn over it.
+    void begin_picture(Drawing& drawing, std::optional<Rainfall> rain);
     void begin(Drawing& drawing);
     void finish(Drawing& drawing);
     // Draws the rain of a picture that is complete otherwise, or begins to. `known`: the light of the cloud is still that of
     // the picture.
     void begin_rain(Drawing& drawing, bool known);
     // Begins and finishes a frame, which is left dark where its rays meet terrain.
-    Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail, TerrainView& terrain);
+    Picture draw(Drawing& drawing);
     // Draws the terrain of `splats`, seen as `view` has it, into a picture that draw() left dark there; `mirror` may be null.
     void draw_terrain_of(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
                          const DetailView& detail, const TerrainView& view, const MirrorView* mirror, Picture& picture);
+    // Has the back-end draw the ground of a picture with it, behind a mirrored view which is drawn now. Returns false where
+    // there is nothing to draw, or only draw_in_passes() can.
+    bool add_ground(Drawing& drawing);
+    // What the mirrored eye sees: options and splats.
+    struct Mirrored {
+        RenderOptions options;
+        Splats splats;
+    };
+    Mirrored mirrored_of(const Splats& splats, const RenderOptions& options) const;
     // The view of the mirrored eye, where water shows it.
     std::optional<MirrorView> mirror_of(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
                                         const DetailView& detail);
     // Draws a frame over which the processor draws: ground that is not plain or not level, veils per pixel.
-    Picture draw_in_passes(const Splats& splats, const RenderOptions& options);
-    // The passes: wet, snowy or farmed ground; veils. They change `picture`, which was drawn with `detail`.
+    Picture draw_in_passes(Drawing& drawing);
+    // The passes: wet, snowy or farmed ground, where the back-end does not draw it; veils. They change `picture`, which was drawn with `detail`.
     void draw_ground(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
                      const DetailView& detail, const MirrorView* mirror, Picture& picture);
     void draw_veils_of(const Splats& splats, const RenderOptions& options, const DetailView& detail,

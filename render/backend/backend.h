@@ -24,6 +24,7 @@
 #include "render/frame/air_shells.h"
 #include "render/frame/frame_data.h"
 #include "render/frame/view_sorting.h"
+#include "render/ground/ground_pass.h"
 #include "render/image/picture.h"
 #include "render/options/device_options.h"
 #include "render/rain/rain_frame.h"
@@ -58,6 +59,12 @@ struct FrameDescription {
     AirCache& air;
     StageTimes& times;
     std::span<const float> terrain{};  // TerrainView::distance_m; empty: level ground
+    // Ground to draw behind the rest, by a back-end that Backend::draws_ground(); null: it is plain and dry. Its mirrored
+    // view is on the host, or with `shows_kept` the one that was kept last.
+    const GroundPass* ground = nullptr;
+    bool shows_kept = false;
+    // The picture is a mirrored view, which the back-end keeps for later ground instead of storing its pixels.
+    bool keeps = false;
 
     // Returns the splats that the camera sees in view order, the metaballs still without their light. Throws
     // Error(usage) naming a billboard that is not as splats.h requires.
@@ -119,6 +126,10 @@ class Backend {
     // it is in flight: the picture must not move until finish() or abandon(). `cloud`: that of the picture, which is the one
     // last passed to begin(); null: it may be another, and Picture::shadow is read instead.
     virtual bool begin_rain(const RainFrame&, const Weather&, const LitCloud*, Picture&) { return false; }
+
+    // Returns whether it draws level ground that is not plain and dry itself (FrameDescription::ground), with this cover
+    // and the mirrored view of this camera; otherwise the processor does (wet_ground.h).
+    virtual bool draws_ground(const GroundCoverView&, const Camera&) const { return false; }
 
     // Returns whether it ray-marches volumes with detail (LitCloud::volumes); otherwise it draws their metaballs.
     virtual bool marches() const { return false; }

@@ -26,8 +26,11 @@ namespace spirv {
 #include "shade_light_comp.h"
 #include "shell_frag.h"
 #include "shell_vert.h"
+#include "mirror_level_comp.h"
 #include "view_finish_comp.h"
+#include "view_ground_comp.h"
 #include "march_finish_comp.h"
+#include "march_ground_comp.h"
 #include "march_shells_comp.h"
 #include "march_tiles_comp.h"
 #include "view_project_comp.h"
@@ -97,7 +100,8 @@ const ShaderSet& shaders() {
         spirv::view_splat_frag,  spirv::billboard_vert,     spirv::billboard_frag,    spirv::view_shells_comp,
         spirv::shell_vert,       spirv::shell_frag,          spirv::march_tiles_comp,  spirv::march_shells_comp,
         spirv::march_finish_comp, spirv::shade_light_comp,   spirv::rain_shafts_comp,  spirv::rain_streaks_comp,
-        spirv::rain_bands_comp,   spirv::rain_tiles_comp};
+        spirv::rain_bands_comp,   spirv::rain_tiles_comp,     spirv::view_ground_comp,  spirv::march_ground_comp,
+        spirv::mirror_level_comp};
     return kShaders;
 }
 

@@ -21,6 +21,7 @@ struct ShaderSet {
     ShaderCode view_shells_comp, shell_vert, shell_frag;
     ShaderCode march_tiles_comp, march_shells_comp, march_finish_comp, shade_light_comp;
     ShaderCode rain_shafts_comp, rain_streaks_comp, rain_bands_comp, rain_tiles_comp;
+    ShaderCode view_ground_comp, march_ground_comp, mirror_level_comp;
 };
 const ShaderSet& shaders();
 

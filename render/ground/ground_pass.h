@@ -34,6 +34,12 @@ struct GroundPass {
     RippleGrid ripples;
     const MirrorView* mirror = nullptr;
     float reflection = 0;
+    bool lying = false;  // whether water or snow lie somewhere
 };
+
+struct WetGround;
+
+// Returns the pass over a picture of these options, whose shadow map has this frame. Refers to what `ground` refers to.
+GroundPass ground_pass(const WetGround& ground, const ShadowFrame& shadow_frame);
 
 }  // namespace nephos

@@ -14,12 +14,8 @@ namespace {
 constexpr double kMargin = 1.15;  // of the mirrored view's edges, as a multiple of the camera's
 constexpr double kMostReach = 0.6;  // tangent: waves show what stands four times their slope higher, up to this
 
-// The mean of up to four texels of the level before; at odd sizes the last row and column count twice.
-void append_level(MirrorView& view) {
-    const MirrorView::Level fine = view.levels.back();
-    const MirrorView::Level coarse{fine.first + fine.width * fine.height, (fine.width + 1) / 2,
-                                   (fine.height + 1) / 2};
-    view.texels.resize(4 * std::size_t(coarse.first + coarse.width * coarse.height));
+// Each texel is the mean of up to four of the level before; at odd sizes the last row and column count twice.
+void fill_level(MirrorView& view, const MirrorView::Level& fine, const MirrorView::Level& coarse) {
     const auto texel = [&](int x, int y) {
         return &view.texels[4 * std::size_t(fine.first + std::min(y, fine.height - 1) * fine.width +
                                             std::min(x, fine.width - 1))];
@@ -33,7 +29,6 @@ void append_level(MirrorView& view) {
             }
         }
     }
-    view.levels.push_back(coarse);
 }
 
 }  // namespace
@@ -59,18 +54,32 @@ Camera mirrored_camera(const RenderOptions& options) {
     return mirrored;
 }
 
-MirrorView mirror_view(const Picture& picture, const Camera& camera) {
+MirrorView mirror_layout(const Camera& camera) {
     MirrorView view;
     view.frame = camera_frame(camera);
     view.pixels_per_unit = pixels_per_unit(camera, view.frame);
-    view.levels.push_back({0, picture.width, picture.height});
-    view.texels.resize(4 * picture.pixels());
+    view.levels.push_back({0, camera.width, camera.height});
+    while (view.levels.back().width > 2 && view.levels.back().height > 2 &&
+           view.levels.size() < shader::kMirrorLevels) {
+        const MirrorView::Level& fine = view.levels.back();
+        view.levels.push_back({fine.first + fine.width * fine.height, (fine.width + 1) / 2, (fine.height + 1) / 2});
+    }
+    return view;
+}
+
+std::size_t mirror_texels(const MirrorView& view) {
+    const MirrorView::Level& last = view.levels.back();
+    return std::size_t(last.first) + std::size_t(last.width) * std::size_t(last.height);
+}
+
+MirrorView mirror_view(const Picture& picture, const Camera& camera) {
+    MirrorView view = mirror_layout(camera);
+    view.texels.resize(4 * mirror_texels(view));
     for (std::size_t i = 0; i < picture.pixels(); ++i) {
         std::copy_n(&picture.beauty[3 * i], 3, &view.texels[4 * i]);
         view.texels[4 * i + 3] = picture.transmittance[i];
     }
-    while (view.levels.back().width > 2 && view.levels.back().height > 2 && view.levels.size() < 8)
-        append_level(view);
+    for (std::size_t n = 1; n < view.levels.size(); ++n) fill_level(view, view.levels[n - 1], view.levels[n]);
     return view;
 }
 

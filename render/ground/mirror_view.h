@@ -6,11 +6,13 @@
 // positions, at any distance. Rays reflected by ripples sample this view in their perturbed direction.
 // Private to the module.
 
+#include <cstddef>
 #include <vector>
 
 #include "render/image/picture.h"
 #include "render/options/camera.h"
 #include "render/options/options.h"
+#include "render/shared/ground.h"
 
 namespace nephos {
 
@@ -31,6 +33,9 @@ struct MirrorView {
     double pixels_per_unit = 1;  // of the first level, at distance 1
 };
 
+// Returns the pyramid of a picture of `camera` without its texels, and their number.
+MirrorView mirror_layout(const Camera& camera);
+std::size_t mirror_texels(const MirrorView& view);
 // Builds the pyramid of `picture`, which was drawn with `camera`.
 MirrorView mirror_view(const Picture& picture, const Camera& camera);
 

@@ -27,6 +27,7 @@ struct RippleGrid {
 
 RippleGrid ripple_grid(const GroundCoverView& cover, double time_s, double strength, const Vec3& eye_m);
 
-inline constexpr double kRippleHexagon_m = 1.3;  // distance of corners of the triangles between hexagons
+inline constexpr double kRippleHexagon_m = 1.3;
+static_assert(float(kRippleHexagon_m) == shader::kRippleApart_m);
 
 }  // namespace nephos

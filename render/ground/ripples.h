@@ -21,10 +21,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/shared/ground.h"
+
 namespace nephos {
 
-inline constexpr int kRippleTexels = 128;             // on a side, a power of two
-inline constexpr double kRippleSize_m = 2.0;          // side of the square
+inline constexpr int kRippleTexels = int(shader::kRippleSide);
+inline constexpr double kRippleSize_m = double(shader::kRippleSquare_m);
 inline constexpr double kRippleStep_s = 0.02;         // t
 inline constexpr double kRippleSpeed_m_per_s = 0.25;  // v: of capillary waves of some centimetres
 inline constexpr double kRippleDamping_per_s = 6.0;   // d

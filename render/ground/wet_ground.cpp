@@ -164,6 +164,7 @@ bool any(std::span<const float> values) {
 }
 
 bool any_water(const GroundCoverView& cover) { return cover.outside.water_mm > 0 || any(cover.water_mm); }
+bool any_snow(const GroundCoverView& cover) { return cover.outside.snow_mm > 0 || any(cover.snow_mm); }
 
 // Returns true when a corner of the image, and hence any ray, points below the horizon of the plane.
 bool ground_in_view(const RenderOptions& options) {
@@ -201,7 +202,12 @@ bool shows_pattern(const RenderOptions& options) {
 }
 
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover) {
-    return (any_water(cover) || cover.outside.snow_mm > 0 || any(cover.snow_mm)) && ground_in_view(options);
+    return (any_water(cover) || any_snow(cover)) && ground_in_view(options);
+}
+
+const GroundCoverView& cover_of(const Splats& splats) {
+    static const GroundCoverView kDry;
+    return splats.ground_cover ? *splats.ground_cover : kDry;
 }
 
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover) {
@@ -242,15 +248,15 @@ void check(const GroundCoverView& cover) {
             "expected water, snow and rain of 0 mm or more outside");
 }
 
-void draw_wet_ground(const WetGround& ground, Picture& picture) {
+GroundPass ground_pass(const WetGround& ground, const ShadowFrame& shadow_frame) {
     const RenderOptions& options = ground.options;
     const Vec3& eye = options.camera.position_m;
     GroundPass pass;
     pass.look = &options.wet_ground;
     RenderOptions white = options;
     white.ground.albedo = {1, 1, 1};
-    pass.white = frame_data(white, camera_frame(options.camera), picture.shadow_frame, ground.flash,
-                            {0, 0, picture.width, picture.height}, ground.sky);
+    pass.white = frame_data(white, camera_frame(options.camera), shadow_frame, ground.flash,
+                            {0, 0, options.camera.width, options.camera.height}, ground.sky);
     pass.white.endless = ground.endless;
     if (ground.light != nullptr) use_ground_light(*ground.light, eye, pass.white);
     const Rgb& albedo = options.ground.albedo;
@@ -260,12 +266,18 @@ void draw_wet_ground(const WetGround& ground, Picture& picture) {
     pass.shadow = ground.shadow;
     pass.shadow_size = ground.shadow_size;
     pass.cover = texels_of(ground.cover, eye);
+    pass.lying = any_water(ground.cover) || any_snow(ground.cover);
     const double puddle_m = options.wet_ground.puddle_size_m;
     pass.hollows = noise_octaves({150 * puddle_m, 0.45, 10, 1.0, 0x77657400u}, eye);
     pass.tufts = noise_octaves({900, 0.42, 11, 1.0, 0x736e6f77u}, eye);
     pass.ripples = ripple_grid(ground.cover, ground.time_s, options.wet_ground.ripples, eye);
     pass.mirror = ground.mirror;
     pass.reflection = float(options.wet_ground.reflection);
+    return pass;
+}
+
+void draw_wet_ground(const WetGround& ground, Picture& picture) {
+    const GroundPass pass = ground_pass(ground, picture.shadow_frame);
     tbb::parallel_for(0, picture.height, [&](int y) { HWY_DYNAMIC_DISPATCH(draw_row)(pass, y, picture); });
 }
 

@@ -6,9 +6,10 @@
 //
 //     beauty += transmittance * (beta * (ground now - dry ground) + reflected light)
 //
-// per pixel on the ground, with the picture's transmittance of the clouds and beta of the air. One
-// implementation on the processor thus serves all back-ends, which agree as well as without it, and is
-// independent of air, clouds and rain in front. Shadows on wet ground and snow are those of dry ground: all
+// per pixel on the ground, with the picture's transmittance of the clouds and beta of the air. It is thus
+// independent of air, clouds and rain in front, and one implementation on the processor serves the back-ends
+// cpu and blended; vulkan has passes of its own (render/vulkan/device_ground.h), but for ground that is not
+// level. Shadows on wet ground and snow are those of dry ground: all
 // are lit by the light of the picture's ground of albedo 1.
 //
 // At a point with a film of V mm of water and W mm of water in the snow:
@@ -28,12 +29,13 @@
 #include "render/ground/mirror_view.h"
 #include "render/image/picture.h"
 #include "render/options/options.h"
+#include "render/shared/ground.h"
 
 namespace nephos {
 
 // Reflectance of water at normal incidence, ((n - 1) / (n + 1))^2 with n = 1.333.
-inline constexpr float kWaterNormalReflectance = 0.0204f;
-inline constexpr float kFilmSpread = 0.6f;  // standard deviation of the logarithm of the hollows' depths
+inline constexpr float kWaterNormalReflectance = shader::kWaterFromAbove;
+inline constexpr float kFilmSpread = shader::kFilmDeviations;
 
 // Returns the Fresnel reflectance of water with a variance of slopes at a cosine of the angle of view from
 // above, averaged over the visible slopes: Bruneton, Neyret and Holzschuch 2010, section 5; Schlick's for
@@ -50,6 +52,12 @@ double soaked_back_reflectance();  // p
 bool shows_pattern(const RenderOptions& options);
 // Returns true when water or snow and ground are in view.
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover);
+// Returns true for either.
+inline bool shows_ground(const RenderOptions& options, const GroundCoverView& cover) {
+    return shows_wet_ground(options, cover) || shows_pattern(options);
+}
+// Returns the cover of a scene's ground; none where it is dry.
+const GroundCoverView& cover_of(const Splats& splats);
 // Returns true when reflections need a mirrored view.
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover);
 
@@ -72,7 +80,7 @@ struct WetGround {
     const GroundLight* light = nullptr;     // below clouds; null: as without
 };
 
-// Replaces the light of the ground, rows in parallel; the result does not depend on the number of threads.
+// Replaces the light of level ground, rows in parallel; the result does not depend on the number of threads.
 void draw_wet_ground(const WetGround& ground, Picture& picture);
 
 // Throws Error(usage) naming the first value that is not as a GroundCoverView wants it.

@@ -20,8 +20,8 @@ vec3 sky(vec3 ray) {
     return gradient_sky(max(ray.z, 0.0));
 }
 
-vec3 ground(vec3 ray, float distance) {
-    vec3 point = distance * ray;
+// Returns the fraction of direct sunlight that arrives on the ground at a point relative to the eye.
+float sun_share(vec3 point) {
     vec2 coordinate = vec2(dot(frame.shadow_u.xyz, point) + frame.shadow_u.w,
                            dot(frame.shadow_v.xyz, point) + frame.shadow_v.w);
     float shadow = textureLod(shadow_map, coordinate, 0.0).r;
@@ -29,16 +29,27 @@ vec3 ground(vec3 ray, float distance) {
     vec2 inner = step(vec2(0.01), coordinate) * step(coordinate, vec2(0.99));
     bool known = inner.x * inner.y > 0.0 && sees_first_period(point);
     if (endless() && !known) shadow = sunlight_beyond(point);
+#endif
+    return shadow;
+}
+
+// Returns the radiance of the ground there, without the air in front of it.
+vec3 ground_light(vec3 point, float sun) {
+#ifdef NEPHOS_ENDLESS
     vec2 below = light_below(point);
-    vec3 colour = frame.ground.rgb * below.y + frame.ground_sun.rgb * (shadow + below.x);
+    vec3 colour = frame.ground.rgb * below.y + frame.ground_sun.rgb * (sun + below.x);
 #else
-    vec3 colour = frame.ground.rgb + frame.ground_sun.rgb * shadow;
+    vec3 colour = frame.ground.rgb + frame.ground_sun.rgb * sun;
 #endif
     vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark, no branch: see lighting.glsl
     float squared = dot(way, way);
-    colour += frame.ground_flash.rgb * flash_falloff(squared) * max(way.z, 0.0) * inversesqrt(max(squared, 1.0e-6));
-    vec3 beta = air_transmittance(ray, distance);
-    return beta * colour + air_light(ray, distance, beta);
+    return colour +
+           frame.ground_flash.rgb * flash_falloff(squared) * max(way.z, 0.0) * inversesqrt(max(squared, 1.0e-6));
+}
+
+vec3 ground(vec3 ray, float distance) {
+    vec3 point = distance * ray, beta = air_transmittance(ray, distance);
+    return beta * ground_light(point, sun_share(point)) + air_light(ray, distance, beta);
 }
 
 vec3 background(vec3 ray) {

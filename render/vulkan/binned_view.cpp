@@ -79,6 +79,7 @@ struct BinnedView::Slot {
           order_frame(uniform_buffer<shader::OrderFrame>(gpu)),
           shells(uniform_buffer<shader::Shells>(gpu)),
           march(uniform_buffer<shader::March>(gpu)),
+          ground(gpu),
           fence(gpu.device, vk::FenceCreateInfo()) {
         upload(gpu, billboards, {});
         upload(gpu, clouds, {});
@@ -90,6 +91,7 @@ struct BinnedView::Slot {
 
     DescriptorSets sets;
     GpuBuffer frame, order_frame, shells, march, billboards, clouds, terrain;  // read by the device
+    GroundBuffers ground;
     GpuBuffer radiance, depth, counts;                         // read back
     vk::raii::CommandBuffer commands{nullptr};
     vk::raii::Fence fence;
@@ -97,6 +99,7 @@ struct BinnedView::Slot {
     Picture* picture = nullptr;  // whose pixels are not stored yet
     ViewInputs what;
     PicturePart part;
+    const Pipeline* ground_of = nullptr;  // null: the ground is plain and dry
     std::size_t billboard_count = 0;
     std::size_t capacity = 0, batch = 0;  // of the lists, in the commands
     bool with_order = true;               // else the order of the slot before
@@ -126,7 +129,9 @@ BinnedView::BinnedView(const GpuDevice& gpu, const GpuImage& unused, const vk::r
       clamped_(clamped),
       white_beyond_(white_beyond),
       lists_(gpu),
-      shade_(gpu) {
+      shade_(gpu),
+      mirror_(gpu),
+      grounds_(gpu) {
     for (std::size_t n = 0; n < kFramesInFlight; ++n) slots_.push_back(std::make_unique<Slot>(gpu));
     use_cloud({});
 }
@@ -247,6 +252,24 @@ void BinnedView::record_batch(const vk::raii::CommandBuffer& commands, Slot& slo
     }
 }
 
+void BinnedView::begin_mirror(const Camera& camera) {
+    flush();
+    mirror_.begin(gpu_, camera);
+}
+
+void BinnedView::use_mirror(const MirrorView& view) {
+    flush();
+    mirror_.use(gpu_, view);
+}
+
+void BinnedView::record_ground(const vk::raii::CommandBuffer& commands, Slot& slot, const Resources& resources) {
+    Resources all = resources;
+    slot.ground.add_to(all, mirror_.texels());
+    pass_barrier(commands);
+    begin_compute(commands, *slot.ground_of, slot.sets.fill(*slot.ground_of, all), step_over({slot.part.width, slot.part.height}));
+    dispatch_groups(commands, (pixels_of(slot.part) + shader::kComputeGroup - 1) / shader::kComputeGroup);
+}
+
 void BinnedView::record(const vk::raii::CommandBuffer& commands, Slot& slot) {
     const std::size_t pixels = pixels_of(slot.part), splats = balls_ + slot.billboard_count;
     const Pipelines& pipelines = pipelines_for(slot.what.variant);
@@ -274,8 +297,12 @@ void BinnedView::record(const vk::raii::CommandBuffer& commands, Slot& slot) {
     step.distances = slot.what.depth;
     begin_compute(commands, pipelines.finish, slot.sets.fill(pipelines.finish, resources), step);
     dispatch_groups(commands, (pixels + shader::kComputeGroup - 1) / shader::kComputeGroup);
+    if (slot.ground_of != nullptr) record_ground(commands, slot, resources);
     copy_barrier(commands);
-    copy(commands, radiance_, slot.radiance, 4 * sizeof(float) * pixels);
+    if (slot.what.keeps)
+        mirror_.record_part(commands, radiance_, slot.part);
+    else
+        copy(commands, radiance_, slot.radiance, 4 * sizeof(float) * pixels);
     if (slot.what.depth) copy(commands, depth_, slot.depth, sizeof(float) * pixels);
     copy(commands, lists_.counts(), slot.counts, sizeof(shader::OrderCounts));
     host_barrier(commands);
@@ -309,6 +336,7 @@ void BinnedView::complete(Slot& slot) {
         submit(slot);
         slot.wait(gpu_);
     }
+    if (slot.what.keeps) return;
     store_part(reinterpret_cast<const float*>(slot.radiance.mapped),
                slot.what.depth ? reinterpret_cast<const float*>(slot.depth.mapped) : nullptr, slot.part,
                picture);
@@ -400,11 +428,23 @@ void BinnedView::begin_part(const ViewInputs& what, const shader::FrameUniforms&
     upload(gpu_, slot.clouds, std::as_bytes(what.clouds));
     upload_terrain(gpu_, slot.terrain, what.terrain);
     if (what.march != nullptr) write(gpu_, slot.march, *what.march);
+    slot.ground_of = nullptr;
+    if (what.ground != nullptr) {
+        grounds += first ? 1 : 0;
+        slot.ground.use(gpu_, *what.ground, what.shows_mirror ? &mirror_.layout() : nullptr, frame);
+        slot.ground_of = &grounds_.of({.sea = what.ground->water.enabled,
+                                       .country = what.ground->country.enabled,
+                                       .lying = what.ground->lying,
+                                       .mirror = what.shows_mirror,
+                                       .physical_sky = what.variant.physical_sky,
+                                       .march = what.variant.march});
+    }
     slot.what.shells = nullptr;  // these are there
     slot.what.march = nullptr;
     slot.what.billboards = {};
     slot.what.clouds = {};
     slot.what.terrain = {};
+    slot.what.ground = nullptr;
     slot.with_order = first || ordered_ != &picture;
     submit(slot);
     slot.picture = &picture;

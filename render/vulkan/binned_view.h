@@ -19,7 +19,9 @@
 #include "render/gpu/frame_uploads.h"
 #include "render/gpu/gpu_pipeline.h"
 #include "render/image/picture.h"
+#include "render/vulkan/device_ground.h"
 #include "render/vulkan/device_lists.h"
+#include "render/vulkan/device_mirror.h"
 #include "render/vulkan/device_shade.h"
 #include "render/vulkan/device_sun.h"
 #include "render/vulkan/march_volumes.h"
@@ -43,6 +45,9 @@ struct ViewInputs {
     MarchVolumes* volumes = nullptr;        // of these
     bool depth = true;
     std::span<const float> terrain;  // TerrainView::distance_m, see variant.terrain; until begin_part() returns
+    const GroundPass* ground = nullptr;  // as FrameDescription::ground; until begin_part() returns
+    bool shows_mirror = false;           // water shows the view in mirror()
+    bool keeps = false;                  // the picture goes to mirror()
 };
 
 class BinnedView {
@@ -68,6 +73,12 @@ class BinnedView {
     // Sets the shade map of later frames (device_shade.h).
     void use_shade(const ShadeInputs& shade);
 
+    // Makes room for the mirrored view of a camera, the next picture: keep_mirror() when it is finished; or sets one that
+    // is on the host. They wait for frames in flight.
+    void begin_mirror(const Camera& camera);
+    void keep_mirror() { mirror_.build(gpu_); }
+    void use_mirror(const MirrorView& view);
+
     // Begins to draw a part into `picture`, which must stay where it is until it is finished. `first`: of it.
     void begin_part(const ViewInputs& what, const shader::FrameUniforms& frame, const PicturePart& part, Picture& picture,
                     bool first);
@@ -84,6 +95,8 @@ class BinnedView {
     ListLimits limits;
     // Parts that were drawn again because of their lists, for tests.
     std::size_t overflows = 0;
+    // Pictures whose ground was drawn, for tests.
+    std::size_t grounds = 0;
 
     // The lists of the last part that was drawn, for tests.
     struct Lists {
@@ -104,6 +117,7 @@ class BinnedView {
     void flush(Slot& slot) noexcept;
     void submit(Slot& slot);
     void record(const vk::raii::CommandBuffer& commands, Slot& slot);
+    void record_ground(const vk::raii::CommandBuffer& commands, Slot& slot, const Resources& resources);
     void record_batch(const vk::raii::CommandBuffer& commands, Slot& slot, const Resources& resources,
                       std::size_t begin, std::size_t end);
     Resources view_resources(const Slot& slot) const;
@@ -117,6 +131,8 @@ class BinnedView {
     std::size_t balls_ = 0;
     std::size_t batch_ = 0;  // splats of a batch for which the lists of this cloud had room
     DeviceShade shade_;
+    DeviceMirror mirror_;
+    GroundPipelines grounds_;
     GpuBuffer radiance_, depth_;
     GpuImage billboard_textures_;  // created with the first billboard
     std::uint64_t pictures_ = 0;   // BillboardPictures::serial of these; 0: none

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "render/backend/host_light.h"
+#include "render/ground/mirror_view.h"
 #include "render/shared/half_floats.h"
 
 namespace nephos {
@@ -105,6 +106,18 @@ void VulkanBackend::fetch_light(LitCloud& cloud) {
     scene_.fetch_map(cloud);
 }
 
+bool VulkanBackend::draws_ground(const GroundCoverView& cover, const Camera& mirrored) const {
+    const std::size_t most = scene_.gpu.properties.limits.maxStorageBufferRange;
+    return 3 * cover.water_mm.size_bytes() <= most &&
+           4 * sizeof(float) * mirror_texels(mirror_layout(mirrored)) <= most;
+}
+
+void VulkanBackend::use_mirror(const FrameDescription& frame, const Picture& picture) {
+    kept_ = frame.keeps ? &picture : nullptr;
+    if (frame.keeps) view().begin_mirror(frame.options.camera);
+    if (frame.ground != nullptr && frame.ground->mirror != nullptr) view().use_mirror(*frame.ground->mirror);
+}
+
 bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
     check_limits(frame);
     LitCloud& cloud = frame.cloud;
@@ -136,6 +149,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                                 frame.options.light, earth_bend(frame.sky));
         use_volumes(cloud);
     }
+    use_mirror(frame, picture);
     const StageTimer timer(&frame.times, DrawStage::view);
     const ViewInputs what{.variant = {.physical_sky = frame.sky != nullptr,
                                       .shells = shells.any(),
@@ -157,7 +171,10 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                           .march = march.count > 0 ? &march : nullptr,
                           .volumes = march.count > 0 ? &*volumes_ : nullptr,
                           .depth = frame.splats.depth,
-                          .terrain = frame.terrain};
+                          .terrain = frame.terrain,
+                          .ground = frame.ground,
+                          .shows_mirror = frame.shows_kept || (frame.ground != nullptr && frame.ground->mirror != nullptr),
+                          .keeps = frame.keeps};
     try {
         for (const FramePart& part : frame.parts)
             view().begin_part(what, part.frame, part.area, picture, &part == &frame.parts.front());
@@ -184,10 +201,15 @@ bool VulkanBackend::begin_rain(const RainFrame& frame, const Weather& weather, c
 
 void VulkanBackend::finish(Picture& picture) {
     if (view_) view_->finish(picture);
+    if (kept_ == &picture) {
+        kept_ = nullptr;
+        view().keep_mirror();
+    }
     if (rain_) rain_->finish(picture);
 }
 
 void VulkanBackend::abandon(const Picture& picture) noexcept {
+    if (kept_ == &picture) kept_ = nullptr;
     if (view_) view_->abandon(picture);
     if (rain_) rain_->abandon(picture);
 }

@@ -29,6 +29,7 @@ class VulkanBackend : public Backend {
     void finish(Picture& picture) override;
     void abandon(const Picture& picture) noexcept override;
     bool begin_rain(const RainFrame& rain, const Weather& weather, const LitCloud* cloud, Picture& picture) override;
+    bool draws_ground(const GroundCoverView& cover, const Camera& mirrored) const override;
     bool marches() const override { return true; }
     std::vector<std::string> validation_messages() const override { return scene_.validation_messages(); }
 
@@ -43,9 +44,11 @@ class VulkanBackend : public Backend {
     void check_limits(const FrameDescription& frame);
     void use_cloud(const LitCloud& cloud);
     void use_volumes(const LitCloud& cloud);
+    void use_mirror(const FrameDescription& frame, const Picture& picture);
     void light(LitCloud& cloud, StageTimes& times);
 
     GpuScene scene_;
+    const Picture* kept_ = nullptr;  // in flight, on its way to the view's mirror
     std::optional<MarchVolumes> volumes_;  // with the first cloud with detail
     Version held_metaballs_ = 0;    // LitCloud::metaballs of what is in view_
     Version held_light_ = 0;        // LitCloud::light of the light of these

@@ -158,6 +158,12 @@ std::size_t RendererTestAccess::overflows(const Renderer& renderer) {
     return view != nullptr ? view->overflows : 0;
 }
 
+std::size_t RendererTestAccess::grounds_on_device(const Renderer& renderer) {
+    const BinnedView* const view =
+        vulkan(renderer) == nullptr ? nullptr : vulkan(renderer)->view_if_created();
+    return view != nullptr ? view->grounds : 0;
+}
+
 void RendererTestAccess::limit_storage(Renderer& renderer, std::uint32_t bytes) {
     device(renderer).properties.limits.maxStorageBufferRange = bytes;
 }

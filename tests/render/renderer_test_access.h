@@ -21,6 +21,8 @@ struct RendererTestAccess {
     static std::size_t light_passes(const Renderer& renderer);
     // Returns the pictures whose rain the device has drawn so far.
     static std::size_t rains_on_device(const Renderer& renderer);
+    // Likewise, whose ground it has drawn.
+    static std::size_t grounds_on_device(const Renderer& renderer);
     // Fewer rows of a picture than the device draws rain over at once.
     static void limit_rain_rows(Renderer& renderer, int rows);
     // Returns the bytes uploaded to the device so far.

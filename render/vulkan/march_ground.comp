@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "render/shared/march.h"
+#include "render/shared/ground.h"
+// view_ground.comp below clouds with detail, behind march_finish.comp.
+#include "render/shading/frame.glsl"
+#include "render/shading/ray.glsl"
+#include "render/shading/detail.glsl"
+#include "render/shading/air.glsl"
+#include "render/shading/background.glsl"
+#include "render/vulkan/ground.glsl"
