@@ -41,11 +41,11 @@ RENDER_LAYERS = (
     {"cloud"},
     {"frame"},
     {"shading"},
-    {"rain"},
+    {"rain", "ground"},
     {"backend"},
     {"gpu"},
     {"vulkan", "cpu", "blended"},
-    {"ground", "veil"},
+    {"veil"},
     {"terrain"},
 )
 # render/shared/ is a leaf of plain structs that C++ and GLSL both read.
