@@ -190,8 +190,14 @@ void Renderer::Impl::begin(Drawing& drawing) {
     }
     frame.shows_kept = drawing.shows_kept;
     frame.keeps = drawing.keeps;
+    const bool with_rain = rains_with(drawing);
+    if (with_rain) {
+        backend->light_all(lit, times);
+        hand_out_light(splats, options, picture);
+        frame.rains = prepare_rain(drawing);
+    }
     if (backend->begin(frame, picture)) drawing.backend = backend.get();
-    if (splats.light) hand_out_light(splats, options, picture);
+    if (splats.light && !with_rain) hand_out_light(splats, options, picture);
 }
 
 void Renderer::Impl::begin_picture(Drawing& drawing, std::optional<Rainfall> rain) {
@@ -214,6 +220,22 @@ void Renderer::Impl::finish(Drawing& drawing) {
     wait();
     begin_rain(drawing, false);
     wait();
+}
+
+bool Renderer::Impl::rains_with(const Drawing& drawing) const {
+    const Picture& picture = drawing.picture;
+    // Rain has the light of the metaballs that merged ones stand for, whose light is the device's then.
+    const bool same = lit.merged.empty() || !lit.volumes.empty();
+    return drawing.rain && drawing.splats.light && drawing.splats.depth && same &&
+           std::max(picture.width, picture.height) <= part_size && backend->draws_rain();
+}
+
+bool Renderer::Impl::prepare_rain(Drawing& drawing) {
+    const Rainfall& rain = *drawing.rain;
+    const std::optional<RainFrame> frame = rain_frame(drawing.picture, rain.options, rain.weather, rain.time_s);
+    if (frame && !backend->prepare_rain(*frame, rain.weather, drawing.picture)) return false;
+    drawing.rain.reset();
+    return frame.has_value();
 }
 
 void Renderer::Impl::begin_rain(Drawing& drawing, bool known) {

@@ -52,6 +52,10 @@ struct Renderer::Impl {
     void begin_picture(Drawing& drawing, std::optional<Rainfall> rain);
     void begin(Drawing& drawing);
     void finish(Drawing& drawing);
+    // Returns whether the back-end can draw the rain of a picture with the rest, on its device.
+    bool rains_with(const Drawing& drawing) const;
+    // Hands it over. Precondition: the picture has its light. Returns false where it is drawn later, or none falls.
+    bool prepare_rain(Drawing& drawing);
     // Draws the rain of a picture that is complete otherwise, or begins to. `known`: the light of the cloud is still that of
     // the picture.
     void begin_rain(Drawing& drawing, bool known);

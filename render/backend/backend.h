@@ -65,6 +65,7 @@ struct FrameDescription {
     bool shows_kept = false;
     // The picture is a mirrored view, which the back-end keeps for later ground instead of storing its pixels.
     bool keeps = false;
+    bool rains = false;  // with the rain of Backend::prepare_rain()
 
     // Returns the splats that the camera sees in view order, the metaballs still without their light. Throws
     // Error(usage) naming a billboard that is not as splats.h requires.
@@ -122,6 +123,11 @@ class Backend {
     // Waits for a picture in flight and discards it.
     virtual void abandon(const Picture&) noexcept {}
 
+    // Returns whether it can draw rain with a picture: prepare_rain().
+    virtual bool draws_rain() const { return false; }
+    // Prepares rain for the next begin(), of `picture`, whose pixels are still to be drawn but whose light is there; it
+    // stays where it is until then. Returns false if it cannot be drawn so: then begin_rain() may.
+    virtual bool prepare_rain(const RainFrame&, const Weather&, const Picture&) { return false; }
     // Draws rain over a finished picture. Returns false if it has not: then the processor does (precipitation.h); true if
     // it is in flight: the picture must not move until finish() or abandon(). `cloud`: that of the picture, which is the one
     // last passed to begin(); null: it may be another, and Picture::shadow is read instead.

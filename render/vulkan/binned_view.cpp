@@ -298,6 +298,11 @@ void BinnedView::record(const vk::raii::CommandBuffer& commands, Slot& slot) {
     begin_compute(commands, pipelines.finish, slot.sets.fill(pipelines.finish, resources), step);
     dispatch_groups(commands, (pixels + shader::kComputeGroup - 1) / shader::kComputeGroup);
     if (slot.ground_of != nullptr) record_ground(commands, slot, resources);
+    if (slot.what.rain) {
+        full_barrier(commands);
+        slot.what.rain(commands, slot.sets, radiance_, depth_);
+        full_barrier(commands);
+    }
     copy_barrier(commands);
     if (slot.what.keeps)
         mirror_.record_part(commands, radiance_, slot.part);

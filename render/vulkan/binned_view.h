@@ -22,6 +22,7 @@
 #include "render/vulkan/device_ground.h"
 #include "render/vulkan/device_lists.h"
 #include "render/vulkan/device_mirror.h"
+#include "render/vulkan/device_rain.h"
 #include "render/vulkan/device_shade.h"
 #include "render/vulkan/device_sun.h"
 #include "render/vulkan/march_volumes.h"
@@ -48,6 +49,7 @@ struct ViewInputs {
     const GroundPass* ground = nullptr;  // as FrameDescription::ground; until begin_part() returns
     bool shows_mirror = false;           // water shows the view in mirror()
     bool keeps = false;                  // the picture goes to mirror()
+    DeviceRain::Recording rain;          // over the picture, whose only part this is; empty: none
 };
 
 class BinnedView {

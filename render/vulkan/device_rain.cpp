@@ -13,6 +13,7 @@ namespace nephos {
 namespace {
 
 constexpr std::size_t kFramesInFlight = 2;
+constexpr std::size_t kPrepared = kFramesInFlight + 1;  // two in flight, and the next
 
 void copy(const vk::raii::CommandBuffer& commands, const GpuBuffer& from, const GpuBuffer& to,
           std::size_t bytes) {
@@ -41,21 +42,43 @@ struct DeviceRain::Strip {
     int width = 0, first_row = 0, rows = 0;
 };
 
+struct DeviceRain::Target {
+    const vk::raii::CommandBuffer& commands;
+    DescriptorSets& sets;
+    const GpuImage& shadow_map;
+    const GpuBuffer &pixels, &depths;
+};
+
+struct DeviceRain::Inputs {
+    explicit Inputs(const GpuDevice& gpu)
+        : uniforms(create_buffer(gpu, sizeof(shader::RainUniforms), vk::BufferUsageFlagBits::eUniformBuffer,
+                                 HostAccess::write)) {}
+
+    GpuBuffer uniforms, passes, bases, ground;  // read by the device
+    GpuBuffer splashes, splash_counts;          // copied to it
+};
+
+struct DeviceRain::Prepared {
+    explicit Prepared(const GpuDevice& gpu) : inputs(gpu) {}
+
+    Inputs inputs;
+    RainData data{};
+    Strip strip;
+};
+
 // One picture in flight, or a strip of it.
 struct DeviceRain::Slot {
     explicit Slot(const GpuDevice& gpu)
         : sets(gpu),
-          uniforms(create_buffer(gpu, sizeof(shader::RainUniforms), vk::BufferUsageFlagBits::eUniformBuffer,
-                                 HostAccess::write)),
+          inputs(gpu),
           fence(gpu.device, vk::FenceCreateInfo()) {
         const vk::CommandBufferAllocateInfo info(*gpu.pool, vk::CommandBufferLevel::ePrimary, 1);
         commands = std::move(vk::raii::CommandBuffers(gpu.device, info).front());
     }
 
     DescriptorSets sets;
-    GpuBuffer uniforms, passes, bases, ground;  // read by the device
-    GpuBuffer given, given_depths, result;      // copied to and from it
-    GpuBuffer splashes, splash_counts;          // copied to it
+    Inputs inputs;
+    GpuBuffer given, given_depths, result;  // copied to and from the device
     vk::raii::CommandBuffer commands{nullptr};
     vk::raii::Fence fence;
     bool submitted = false;      // and not known to be done
@@ -71,6 +94,7 @@ DeviceRain::DeviceRain(const GpuDevice& gpu, const vk::raii::Sampler& white_beyo
       bands_of_(create_compute_pipeline(gpu, shaders().rain_bands_comp)),
       tiles_(create_compute_pipeline(gpu, shaders().rain_tiles_comp)) {
     for (std::size_t n = 0; n < kFramesInFlight; ++n) slots_.push_back(std::make_unique<Slot>(gpu));
+    for (std::size_t n = 0; n < kPrepared; ++n) prepared_.push_back(std::make_unique<Prepared>(gpu));
     const std::vector<shader::vec4> nodes = bow_nodes();
     make_storage(gpu, bow_, sizeof(shader::vec4) * nodes.size());
     upload_staged(gpu, bow_, std::as_bytes(std::span(nodes)));
@@ -79,6 +103,7 @@ DeviceRain::DeviceRain(const GpuDevice& gpu, const vk::raii::Sampler& white_beyo
 }
 
 DeviceRain::~DeviceRain() {
+    if (wait_others) wait_others();
     for (const std::unique_ptr<Slot>& slot : slots_)
         if (slot->picture != nullptr) abandon(*slot->picture);
 }
@@ -122,18 +147,52 @@ void DeviceRain::use_shadow(const Picture& picture, double ground_m) {
                                                           : veiled)));
 }
 
-bool DeviceRain::begin(const RainFrame& rain, const Weather& weather, const GpuImage* shadow_map,
-                       Picture& picture) {
-    std::optional<RainData> data = rain_data(rain, weather, picture);
-    if (!data) return false;
+bool DeviceRain::fits(const RainFrame& rain, const RainData& data) const {
     const std::size_t most = gpu_.properties.limits.maxStorageBufferRange;
-    if (sizeof(shader::RainParticle) * rain.particles > most || sizeof(float) * data->bases.size() > most)
-        return false;
-    if (!data->shafts && data->passes.empty() && data->splashes.empty()) return true;  // nothing falls in view
+    return sizeof(shader::RainParticle) * rain.particles <= most && sizeof(float) * data.bases.size() <= most;
+}
+
+bool DeviceRain::prepare(const RainFrame& rain, const Weather& weather, const Picture& picture) {
+    std::optional<RainData> data = rain_data(rain, weather, picture);
+    const std::size_t width = std::size_t(picture.width), rows = std::size_t(picture.height);
+    if (!data || !fits(rain, *data) || picture.height > most_rows) return false;
+    next_prepared_ = (next_prepared_ + 1) % prepared_.size();
+    Prepared& next = *prepared_[next_prepared_];
+    next.strip = {};
+    if (!data->shafts && data->passes.empty() && data->splashes.empty()) return true;
     ++pictures;
+    use_all_of(rain, weather);
+    reserve_shared(width * rows, groups_of(rows, shader::kStreakBandRows));
+    data->uniforms.extra.y = picture.shadow.empty() ? 0.0f : 1.0f;
+    data->uniforms.forward.w = 1;
+    next.data = std::move(*data);
+    upload_frame(next.data, picture, next.inputs);
+    next.strip = {picture.width, 0, picture.height};
+    return true;
+}
+
+DeviceRain::Recording DeviceRain::prepared(const GpuImage& shadow_map) {
+    const Prepared& what = *prepared_[next_prepared_];
+    if (what.strip.rows == 0) return {};
+    return [this, &what, &shadow_map](const vk::raii::CommandBuffer& commands, DescriptorSets& sets,
+                                      const GpuBuffer& pixels, const GpuBuffer& depths) {
+        record_passes({commands, sets, shadow_map, pixels, depths}, what.data, what.inputs, what.strip);
+    };
+}
+
+void DeviceRain::use_all_of(const RainFrame& rain, const Weather& weather) {
     use_noise(weather.seed);
     use_particles(rain.options.precipitation.kind, weather.seed, rain.particles);
     if (particles_.bytes == 0) make_storage(gpu_, particles_, sizeof(shader::RainParticle));
+}
+
+bool DeviceRain::begin(const RainFrame& rain, const Weather& weather, const GpuImage* shadow_map,
+                       Picture& picture) {
+    std::optional<RainData> data = rain_data(rain, weather, picture);
+    if (!data || !fits(rain, *data)) return false;
+    if (!data->shafts && data->passes.empty() && data->splashes.empty()) return true;  // nothing falls in view
+    ++pictures;
+    use_all_of(rain, weather);
     if (shadow_map == nullptr) use_shadow(picture, rain.options.ground.height_m);
     data->uniforms.extra.y = shadow_map != nullptr || !picture.shadow.empty() ? 1.0f : 0.0f;
     const std::size_t row_bytes = 4 * sizeof(float) * std::size_t(picture.width);
@@ -143,25 +202,25 @@ bool DeviceRain::begin(const RainFrame& rain, const Weather& weather, const GpuI
         Slot& slot = *slots_[next_];
         next_ = (next_ + 1) % slots_.size();
         complete(slot);
-        upload_frame(*data, picture, slot);
+        upload_frame(*data, picture, slot.inputs);
         begin_strip(*data, shadow_map != nullptr ? *shadow_map : shadow_,
                     {picture.width, row, std::min(rows, picture.height - row)}, picture, slot);
     }
     return true;
 }
 
-void DeviceRain::upload_frame(const RainData& data, const Picture& picture, Slot& slot) {
-    write(gpu_, slot.uniforms, data.uniforms);
-    upload_some(gpu_, slot.passes, data.passes);
-    upload_some(gpu_, slot.bases, data.bases);
-    upload_some(gpu_, slot.ground, picture.ground_light.words);
+void DeviceRain::upload_frame(const RainData& data, const Picture& picture, Inputs& inputs) {
+    write(gpu_, inputs.uniforms, data.uniforms);
+    upload_some(gpu_, inputs.passes, data.passes);
+    upload_some(gpu_, inputs.bases, data.bases);
+    upload_some(gpu_, inputs.ground, picture.ground_light.words);
     if (data.splashes.empty()) return;
     const std::size_t bytes = sizeof(shader::vec4) * data.splashes.size(),
                       count_bytes = sizeof(shader::uint) * data.splash_counts.size();
-    reserve_staging(gpu_, slot.splashes, bytes);
-    reserve_staging(gpu_, slot.splash_counts, count_bytes);
-    std::memcpy(slot.splashes.mapped, data.splashes.data(), bytes);
-    std::memcpy(slot.splash_counts.mapped, data.splash_counts.data(), count_bytes);
+    reserve_staging(gpu_, inputs.splashes, bytes);
+    reserve_staging(gpu_, inputs.splash_counts, count_bytes);
+    std::memcpy(inputs.splashes.mapped, data.splashes.data(), bytes);
+    std::memcpy(inputs.splash_counts.mapped, data.splash_counts.data(), count_bytes);
     gpu_.uploaded_bytes += bytes + count_bytes;
 }
 
@@ -206,54 +265,57 @@ void DeviceRain::begin_strip(const RainData& data, const GpuImage& shadow_map, c
 
 void DeviceRain::record(const vk::raii::CommandBuffer& commands, const RainData& data,
                         const GpuImage& shadow_map, Slot& slot) {
-    const std::size_t width = std::size_t(slot.strip.width), rows = std::size_t(slot.strip.rows),
-                      pixels = width * rows;
-    const std::size_t tiles_x = groups_of(width, shader::kRainTile);
-    shader::RainStep step{};
-    step.y = shader::uint(slot.strip.first_row);
-    step.width = shader::uint(width);
-    step.height = shader::uint(rows);
-    step.tiles_x = shader::uint(tiles_x);
-    step.tiles = shader::uint(tiles_x * groups_of(rows, shader::kRainTile));
-    step.bands = shader::uint(groups_of(rows, shader::kStreakBandRows));
-    const Resources resources{{0, slot.uniforms}, {1, shadow_map, white_beyond_},
-                              {2, slot.bases},    {3, slot.ground},
-                              {4, bow_},          {5, noise_},
-                              {6, pixels_},       {7, depths_},
-                              {8, slot.passes},   {9, particles_},
-                              {10, streaks_},     {11, segment_counts_},
-                              {12, band_counts_}, {13, band_lists_}};
+    const std::size_t pixels = std::size_t(slot.strip.width) * std::size_t(slot.strip.rows);
     full_barrier(commands);  // the picture before has the same buffers
     copy(commands, slot.given, pixels_, 4 * sizeof(float) * pixels);
     copy(commands, slot.given_depths, depths_, sizeof(float) * pixels);
     full_barrier(commands);
-    if (data.shafts) {
-        begin_compute(commands, shafts_, slot.sets.fill(shafts_, resources), step);
-        dispatch_groups(commands, step.tiles);
-        compute_barrier(commands);
-    }
-    if (!data.splashes.empty()) record_splashes(commands, resources, data, step, slot);
-    for (std::size_t n = 0; n < data.passes.size(); ++n) {
-        step.pass = shader::uint(n);
-        record_particles(commands, resources, step, slot);
-    }
+    record_passes({commands, slot.sets, shadow_map, pixels_, depths_}, data, slot.inputs, slot.strip);
     full_barrier(commands);
     copy(commands, pixels_, slot.result, 4 * sizeof(float) * pixels);
     buffer_barrier(commands, slot.result, access::copy_to, access::host);
 }
 
-void DeviceRain::record_particles(const vk::raii::CommandBuffer& commands, const Resources& resources,
-                                  shader::RainStep step, Slot& slot) {
-    const vk::DescriptorSet streaks = slot.sets.fill(streaks_of_, resources),
-                            bands = slot.sets.fill(bands_of_, resources),
-                            tiles = slot.sets.fill(tiles_, resources);
+void DeviceRain::record_passes(const Target& target, const RainData& data, const Inputs& inputs, const Strip& strip) {
+    const std::size_t width = std::size_t(strip.width), rows = std::size_t(strip.rows);
+    const std::size_t tiles_x = groups_of(width, shader::kRainTile);
+    shader::RainStep step{};
+    step.y = shader::uint(strip.first_row);
+    step.width = shader::uint(width);
+    step.height = shader::uint(rows);
+    step.tiles_x = shader::uint(tiles_x);
+    step.tiles = shader::uint(tiles_x * groups_of(rows, shader::kRainTile));
+    step.bands = shader::uint(groups_of(rows, shader::kStreakBandRows));
+    const Resources resources{{0, inputs.uniforms}, {1, target.shadow_map, white_beyond_},
+                              {2, inputs.bases},    {3, inputs.ground},
+                              {4, bow_},            {5, noise_},
+                              {6, target.pixels},   {7, target.depths},
+                              {8, inputs.passes},   {9, particles_},
+                              {10, streaks_},       {11, segment_counts_},
+                              {12, band_counts_},   {13, band_lists_}};
+    if (data.shafts) {
+        begin_compute(target.commands, shafts_, target.sets.fill(shafts_, resources), step);
+        dispatch_groups(target.commands, step.tiles);
+        compute_barrier(target.commands);
+    }
+    if (!data.splashes.empty()) record_splashes(target, resources, data, inputs, step);
+    for (std::size_t n = 0; n < data.passes.size(); ++n) {
+        step.pass = shader::uint(n);
+        record_particles(target, resources, step);
+    }
+}
+
+void DeviceRain::record_particles(const Target& target, const Resources& resources, shader::RainStep step) {
+    const vk::DescriptorSet streaks = target.sets.fill(streaks_of_, resources),
+                            bands = target.sets.fill(bands_of_, resources),
+                            tiles = target.sets.fill(tiles_, resources);
     for (std::size_t first = 0; first < made_.count; first += shader::kParticlesAtOnce) {
         step.first = shader::uint(first);
         step.count = shader::uint(std::min<std::size_t>(shader::kParticlesAtOnce, made_.count - first));
-        begin_compute(commands, streaks_of_, streaks, step);
-        dispatch_groups(commands, groups_of(step.count, shader::kStreakSegment));
-        compute_barrier(commands);
-        record_streaks(commands, bands, tiles, step);
+        begin_compute(target.commands, streaks_of_, streaks, step);
+        dispatch_groups(target.commands, groups_of(step.count, shader::kStreakSegment));
+        compute_barrier(target.commands);
+        record_streaks(target.commands, bands, tiles, step);
     }
 }
 
@@ -267,22 +329,22 @@ void DeviceRain::record_streaks(const vk::raii::CommandBuffer& commands, vk::Des
     compute_barrier(commands);
 }
 
-void DeviceRain::record_splashes(const vk::raii::CommandBuffer& commands, const Resources& resources,
-                                 const RainData& data, shader::RainStep step, Slot& slot) {
+void DeviceRain::record_splashes(const Target& target, const Resources& resources, const RainData& data,
+                                 const Inputs& inputs, shader::RainStep step) {
     constexpr std::size_t kStreakBytes = 3 * sizeof(shader::vec4);
-    const vk::DescriptorSet bands = slot.sets.fill(bands_of_, resources), tiles = slot.sets.fill(tiles_, resources);
+    const vk::DescriptorSet bands = target.sets.fill(bands_of_, resources), tiles = target.sets.fill(tiles_, resources);
     const std::size_t count = data.splashes.size() / 3;
     for (std::size_t first = 0; first < count; first += shader::kParticlesAtOnce) {
         step.count = shader::uint(std::min<std::size_t>(shader::kParticlesAtOnce, count - first));
         const std::size_t segment = first / shader::kStreakSegment;
-        full_barrier(commands);
-        commands.copyBuffer(*slot.splashes.buffer, *streaks_.buffer,
-                            vk::BufferCopy(kStreakBytes * first, 0, kStreakBytes * step.count));
-        commands.copyBuffer(*slot.splash_counts.buffer, *segment_counts_.buffer,
-                            vk::BufferCopy(sizeof(shader::uint) * segment, 0,
-                                           sizeof(shader::uint) * groups_of(step.count, shader::kStreakSegment)));
-        full_barrier(commands);
-        record_streaks(commands, bands, tiles, step);
+        full_barrier(target.commands);
+        target.commands.copyBuffer(*inputs.splashes.buffer, *streaks_.buffer,
+                                   vk::BufferCopy(kStreakBytes * first, 0, kStreakBytes * step.count));
+        target.commands.copyBuffer(*inputs.splash_counts.buffer, *segment_counts_.buffer,
+                                   vk::BufferCopy(sizeof(shader::uint) * segment, 0,
+                                                  sizeof(shader::uint) * groups_of(step.count, shader::kStreakSegment)));
+        full_barrier(target.commands);
+        record_streaks(target.commands, bands, tiles, step);
     }
 }
 
@@ -311,6 +373,7 @@ void DeviceRain::finish(const Picture& picture) {
 }
 
 void DeviceRain::flush() {
+    if (wait_others) wait_others();
     for (const std::unique_ptr<Slot>& slot : slots_) complete(*slot);
 }
 

@@ -13,8 +13,13 @@
 // The latter two also draw the streaks of splashes, which the processor makes: they are few.
 //
 // Streaks overlap, so that their order shows: it is that of the particles, without atomic counters, and two pictures have
-// the same bits. Two pictures are in flight, each with uniforms and buffers to copy of its own. Private to the module.
+// the same bits.
+//
+// A picture that the view draws at once has its rain in the view's commands, and stays on the device until it is complete.
+// Others, over which the processor has drawn or which are made in parts, are uploaded first. Two of these are in flight,
+// each with uniforms and buffers to copy of its own. Private to the module.
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -37,6 +42,17 @@ class DeviceRain {
     // `shadow_map`: that of the picture, which must not change before; null: Picture::shadow is uploaded. Returns false,
     // and draws nothing, where there are more curtains than shaders know or more particles than a buffer holds.
     bool begin(const RainFrame& rain, const Weather& weather, const GpuImage* shadow_map, Picture& picture);
+    // Prepares the rain over a picture that the view is about to draw; what it reads of `picture` is its light. Returns as
+    // begin(). Afterwards prepared() records it, or is empty where nothing falls in view.
+    bool prepare(const RainFrame& rain, const Weather& weather, const Picture& picture);
+    // Records the prepared rain, with the shadow map of the picture; may be called again while the picture is in flight, of
+    // which no more than two may be. `pixels`, `depths`: as BinnedView has them. Needs barriers before and behind.
+    using Recording = std::function<void(const vk::raii::CommandBuffer& commands, DescriptorSets& sets,
+                                         const GpuBuffer& pixels, const GpuBuffer& depths)>;
+    Recording prepared(const GpuImage& shadow_map);
+    // Waits for what others have in flight that reads these buffers. Empty: nothing does.
+    std::function<void()> wait_others;
+
     // Waits for a picture, and stores its pixels, if it is in flight.
     void finish(const Picture& picture);
     // Waits for all pictures in flight, and stores their pixels: before anything changes that they read.
@@ -49,22 +65,28 @@ class DeviceRain {
     std::size_t pictures = 0;  // that were begun, for tests
 
   private:
+    struct Inputs;  // what shaders read of a picture's rain
+    struct Prepared;
     struct Slot;
-    struct Strip;  // rows of the picture that are drawn at once
+    struct Strip;   // rows of the picture that are drawn at once
+    struct Target;  // commands, and the pixels that they draw over
 
     void use_particles(PrecipitationKind kind, std::uint64_t seed, std::size_t count);
     void use_noise(std::uint64_t seed);
     void use_shadow(const Picture& picture, double ground_m);
-    void upload_frame(const RainData& data, const Picture& picture, Slot& slot);
+    bool fits(const RainFrame& rain, const RainData& data) const;
+    void use_all_of(const RainFrame& rain, const Weather& weather);
+    void upload_frame(const RainData& data, const Picture& picture, Inputs& inputs);
     void reserve_shared(std::size_t pixels, std::size_t bands);
     void begin_strip(const RainData& data, const GpuImage& shadow_map, const Strip& strip, Picture& picture,
                      Slot& slot);
     void record(const vk::raii::CommandBuffer& commands, const RainData& data, const GpuImage& shadow_map,
                 Slot& slot);
-    void record_particles(const vk::raii::CommandBuffer& commands, const Resources& resources,
-                          shader::RainStep step, Slot& slot);
-    void record_splashes(const vk::raii::CommandBuffer& commands, const Resources& resources, const RainData& data,
-                         shader::RainStep step, Slot& slot);
+    // All passes over the pixels of a strip.
+    void record_passes(const Target& target, const RainData& data, const Inputs& inputs, const Strip& strip);
+    void record_particles(const Target& target, const Resources& resources, shader::RainStep step);
+    void record_splashes(const Target& target, const Resources& resources, const RainData& data, const Inputs& inputs,
+                         shader::RainStep step);
     void record_streaks(const vk::raii::CommandBuffer& commands, vk::DescriptorSet bands, vk::DescriptorSet tiles,
                         const shader::RainStep& step);
     void complete(Slot& slot);
@@ -86,6 +108,8 @@ class DeviceRain {
     } made_;
     std::vector<std::unique_ptr<Slot>> slots_;
     std::size_t next_ = 0;
+    std::vector<std::unique_ptr<Prepared>> prepared_;
+    std::size_t next_prepared_ = 0;
 };
 
 }  // namespace nephos

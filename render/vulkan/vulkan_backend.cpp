@@ -52,17 +52,25 @@ BinnedView& VulkanBackend::view() {
 }
 
 DeviceRain& VulkanBackend::rain() {
-    if (!rain_) rain_.emplace(scene_.gpu, scene_.white_beyond);
+    if (!rain_) {
+        rain_.emplace(scene_.gpu, scene_.white_beyond);
+        rain_->wait_others = [this] {
+            if (view_) view_->flush();
+        };
+    }
     return *rain_;
 }
 
-void VulkanBackend::check_limits(const FrameDescription& frame) {
-    const std::size_t splats = frame.cloud.cloud.visible.size() + frame.splats.billboards.size();
+void VulkanBackend::check_splats(std::size_t splats) {
     if (splats > view().limits.splats)
         throw Error(ErrorCode::usage, "this Vulkan device draws at most " +
                                           std::to_string(view().limits.splats) +
                                           " metaballs and billboards, but there are " +
                                           std::to_string(splats) + ": choose the back-end cpu");
+}
+
+void VulkanBackend::check_limits(const FrameDescription& frame) {
+    check_splats(frame.cloud.cloud.visible.size() + frame.splats.billboards.size());
     check_distances(frame.cloud.cloud, frame.camera.position_m);
 }
 
@@ -96,6 +104,7 @@ void VulkanBackend::light(LitCloud& cloud, StageTimes& times) {
 }
 
 void VulkanBackend::light_all(LitCloud& cloud, StageTimes& times) {
+    check_splats(cloud.cloud.visible.size());
     light(cloud, times);
     fetch_light(cloud);
 }
@@ -174,7 +183,8 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                           .terrain = frame.terrain,
                           .ground = frame.ground,
                           .shows_mirror = frame.shows_kept || (frame.ground != nullptr && frame.ground->mirror != nullptr),
-                          .keeps = frame.keeps};
+                          .keeps = frame.keeps,
+                          .rain = frame.rains ? rain().prepared(shadow_map) : DeviceRain::Recording{}};
     try {
         for (const FramePart& part : frame.parts)
             view().begin_part(what, part.frame, part.area, picture, &part == &frame.parts.front());
@@ -183,6 +193,10 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
         throw;
     }
     return true;
+}
+
+bool VulkanBackend::prepare_rain(const RainFrame& frame, const Weather& weather, const Picture& picture) {
+    return rain().prepare(frame, weather, picture);
 }
 
 bool VulkanBackend::begin_rain(const RainFrame& frame, const Weather& weather, const LitCloud* cloud, Picture& picture) {

@@ -28,6 +28,8 @@ class VulkanBackend : public Backend {
     bool begin(const FrameDescription& frame, Picture& picture) override;
     void finish(Picture& picture) override;
     void abandon(const Picture& picture) noexcept override;
+    bool draws_rain() const override { return true; }
+    bool prepare_rain(const RainFrame& frame, const Weather& weather, const Picture& picture) override;
     bool begin_rain(const RainFrame& rain, const Weather& weather, const LitCloud* cloud, Picture& picture) override;
     bool draws_ground(const GroundCoverView& cover, const Camera& mirrored) const override;
     bool marches() const override { return true; }
@@ -41,6 +43,7 @@ class VulkanBackend : public Backend {
     const BinnedView* view_if_created() const { return view_ ? &*view_ : nullptr; }
 
   private:
+    void check_splats(std::size_t splats);
     void check_limits(const FrameDescription& frame);
     void use_cloud(const LitCloud& cloud);
     void use_volumes(const LitCloud& cloud);

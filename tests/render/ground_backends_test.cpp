@@ -312,6 +312,31 @@ TEST_F(GroundBackends, PicturesStayOnTheDevice) {
     }
 }
 
+// Rain over wet ground below clouds with detail, of whose metaballs some are merged.
+TEST_F(GroundBackends, RainFallsInTheSamePass) {
+    GroundView view = views()[0];
+    view.clouds = Clouds::detail;
+    view.options.precipitation.enabled = true;
+    view.options.precipitation.particles = 4000;
+    Splats splats = splats_of(view);
+    Rainfall rain{view.options, {}, view.time_s};
+    rain.weather.seed = 3;
+    RainCurtain& area = rain.weather.curtains.emplace_back();
+    area.y_m = 700;
+    area.semi_a_m = area.semi_b_m = 600;
+    area.base_m = 700;
+    area.rate_mm_per_h = 20;
+    for (const double pixels : {0.0, 40.0}) {
+        view.options.level_of_detail.pixels = rain.options.level_of_detail.pixels = pixels;
+        const Picture expected = cpu_.draw_splats(splats, view.options, {}, rain),
+                      picture = vulkan_.draw_splats(splats, view.options, {}, rain);
+        EXPECT_GT(apart(cpu_.draw_splats(splats, view.options), expected, 0.01f), expected.beauty.size() / 50);
+        EXPECT_LE(apart(picture, expected), picture.beauty.size() / 1000);
+        test::expect_same_bits(vulkan_.draw_splats(splats, view.options, {}, rain), picture);
+    }
+    EXPECT_EQ(RendererTestAccess::rains_on_device(vulkan_), 4u);
+}
+
 // Mirrored views that are larger than what shaders see of a buffer: the processor draws the ground.
 TEST_F(GroundBackends, LargeMirrorsAreLeftToTheProcessor) {
     GroundView view = plain_view("wet");

@@ -314,6 +314,43 @@ TEST_F(RainBackends, StripsDoNotShow) {
     test::expect_no_messages(limited);
 }
 
+// From the view on, with wet ground and rain over it, nothing of a picture is on the host until it is complete.
+TEST_F(RainBackends, PicturesStayOnTheDevice) {
+    std::vector<RainView> all{views()[0], views()[4]};
+    all[0].wet = all[1].cloud = true;
+    all[1].options.level_of_detail.pixels = 0;  // merged metaballs are others in a larger picture
+    for (RainView& view : all) {
+        std::uint64_t bytes[2];
+        for (const int scale : {1, 4}) {
+            view.options.camera.width = 60 * scale;
+            view.options.camera.height = 44 * scale;
+            draw(vulkan_, view);
+            const std::uint64_t before = RendererTestAccess::uploaded_bytes(vulkan_);
+            draw(vulkan_, view);
+            bytes[scale / 4] = RendererTestAccess::uploaded_bytes(vulkan_) - before;
+        }
+        EXPECT_EQ(bytes[1], bytes[0]) << view.name;
+    }
+}
+
+// Rain over parts that are drawn again because their lists were too short.
+TEST_F(RainBackends, AreThereWhereListsWereTooShort) {
+    RainView view = views()[0];
+    const std::vector<Metaball> around = test::ragged_cloud({{-380, 500, 5}, 40, 24, 24, 16});
+    Splats splats = splats_of(view);
+    splats.metaballs = {around, 1e-4, test::kVoxelNormalisation};
+    view.options.camera.width = 240;
+    view.options.camera.height = 176;
+    const auto draw_in = [&](Renderer& renderer) {
+        return renderer.draw_splats(splats, at_time(view), {}, Rainfall{view.options, view.weather, view.time_s});
+    };
+    const Picture expected = draw_in(cpu_), picture = draw_in(vulkan_);  // its lists have not grown yet
+    EXPECT_GT(RendererTestAccess::overflows(vulkan_), 0u);
+    EXPECT_EQ(RendererTestAccess::rains_on_device(vulkan_), 1u);
+    EXPECT_LE(apart(picture, expected), picture.beauty.size() / 1000);
+    test::expect_same_bits(draw_in(vulkan_), picture);
+}
+
 // More curtains than shaders know: the processor draws them.
 TEST_F(RainBackends, ManyCurtainsAreLeftToTheProcessor) {
     RainView view = views()[4];
