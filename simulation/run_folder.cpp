@@ -26,9 +26,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point begin) {
-    return std::chrono::duration<double>(Clock::now() - begin).count();
+constexpr double kLookEvery_s = 0.05;  // whether the folder is still in its place
+
+double seconds_between(Clock::time_point begin, Clock::time_point end) {
+    return std::chrono::duration<double>(end - begin).count();
 }
+double seconds_since(Clock::time_point begin) { return seconds_between(begin, Clock::now()); }
 
 void make_folder(const std::filesystem::path& folder) {
     std::error_code error;
@@ -139,7 +142,6 @@ class Recorder : public SimulationSink {
         for (StatisticsFile& file : layer_statistics_) file.save();
         write_manifest(false, wall_s);
         if (with_checkpoint) write_checkpoint(folder_.checkpoint(), simulation.save());
-        write_manifest(false, wall_s);
     }
 
     // After a failure: lists every frame that is there, beside the steps of the last save(). A manifest that
@@ -297,12 +299,19 @@ void report_progress(const RunObserver& observer, const Simulation& simulation, 
 // Up to the end or until it is stopped; leaves a checkpoint, at the end only where one is wanted.
 void simulate(Simulation& simulation, Recorder& recorder, const RunSettings& settings,
               const RunObserver& observer, const FolderLock& lock, Clock::time_point begin) {
-    Clock::time_point saved = Clock::now();
+    Clock::time_point saved = Clock::now(), looked = saved;
+    lock.require_in_place();
     while (!simulation.finished() && !stopped(observer)) {
-        lock.require_in_place();
         simulation.advance(recorder);
         report_progress(observer, simulation, recorder, settings, "simulating");
-        if (seconds_since(saved) < settings.checkpoint_every_s) continue;
+        const Clock::time_point now = Clock::now();
+        const bool is_due = seconds_between(saved, now) >= settings.checkpoint_every_s;
+        // Not after each of many short steps: it asks the system twice.
+        if (is_due || seconds_between(looked, now) >= kLookEvery_s) {
+            lock.require_in_place();
+            looked = now;
+        }
+        if (!is_due) continue;
         recorder.save(simulation, seconds_since(begin));
         saved = Clock::now();
     }

@@ -2,8 +2,10 @@
 #include "statistics/cloud_sizes.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace nephos {
 namespace {
@@ -11,44 +13,73 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint64_t kLeastInBin = 24;
 constexpr std::uint64_t kLeastInRange = 24;
+constexpr double kFar = 1e-7;  // of two exponents
 
 // Sums over a = first .. last of a^-t, of a^-t log a and of a^-t log^2 a: exact up to 1,024, beyond that by the
 // Euler-Maclaurin formula to its first correction, which is exact to 1e-9 there.
-struct PowerSums {
+struct Sums {
     double zeroth = 0, first = 0, second = 0;
+    double mean() const { return first / zeroth; }
 };
 
-void add_term(PowerSums& sums, double a, double t, double weight) {
-    const double log_a = std::log(a), term = weight * std::exp(-t * log_a);
-    sums.zeroth += term;
-    sums.first += term * log_a;
-    sums.second += term * log_a * log_a;
-}
-
-PowerSums power_sums(const SizeRange& range, double t) {
-    constexpr std::uint64_t kExact = 1024;
-    PowerSums sums;
-    const std::uint64_t end = std::min(range.last, std::max(range.first, kExact));
-    for (std::uint64_t a = range.first; a <= end; ++a) add_term(sums, double(a), t, 1);
-    // Simpson's rule in log a over what is left, from end + 1/2 to last + 1/2 (the midpoint rule turned round).
-    if (range.last > end) {
+// The terms of these sums for one range; their logarithms do not depend on t.
+class PowerSums {
+  public:
+    explicit PowerSums(const SizeRange& range) {
+        constexpr std::uint64_t kExact = 1024;
+        const std::uint64_t end = std::min(range.last, std::max(range.first, kExact));
+        for (std::uint64_t a = range.first; a <= end; ++a) add_term(double(a), 1);
+        // Simpson's rule in log a over what is left, from end + 1/2 to last + 1/2 (the midpoint rule turned round).
+        if (range.last <= end) return;
         const double from = std::log(double(end) + 0.5), to = std::log(double(range.last) + 0.5);
         constexpr int kPieces = 256;
         for (int n = 0; n <= kPieces; ++n) {
             const double a = std::exp(from + (to - from) * n / kPieces);
             const double weight = n == 0 || n == kPieces ? 1 : n % 2 == 1 ? 4 : 2;
-            add_term(sums, a, t, weight * a * (to - from) / kPieces / 3);
+            add_term(a, weight * a * (to - from) / kPieces / 3);
         }
     }
-    return sums;
+
+    Sums at(double t) const {
+        Sums sums;
+        for (const Term& term : terms_) {
+            const double value = term.weight * std::exp(-t * term.log_a);
+            sums.zeroth += value;
+            sums.first += value * term.log_a;
+            sums.second += value * term.log_a * term.log_a;
+        }
+        return sums;
+    }
+
+  private:
+    struct Term {
+        double log_a, weight;
+    };
+    void add_term(double a, double weight) { terms_.push_back({std::log(a), weight}); }
+    std::vector<Term> terms_;
+};
+
+// Returns about the t whose mean logarithm is the observed one, by Newton's method: the derivative of the mean is minus the
+// variance. NaN where it is not within the bisection's range.
+double near_root(const PowerSums& power, double observed) {
+    double t = 2;
+    for (int n = 0; n < 30 && t > -20 && t < 40; ++n) {
+        const Sums sums = power.at(t);
+        const double mean = sums.mean(), variance = sums.second / sums.zeroth - mean * mean;
+        const double step = std::clamp((mean - observed) / variance, -3.0, 3.0);
+        t += step;
+        if (std::abs(step) < kFar / 100) return t;
+    }
+    return kNaN;
 }
 
 }  // namespace
 
 int size_bin(std::uint64_t area) {
-    int bin = 0;
-    while (bin + 1 < kSizeBins && size_bin_begin(bin + 1) <= area) ++bin;
-    return bin;
+    if (area == 0) return 0;
+    const int octave = std::bit_width(area) - 1;
+    if (2 * octave + 1 >= kSizeBins) return kSizeBins - 1;
+    return 2 * octave + int(area >= size_bin_begin(2 * octave + 1));
 }
 
 std::uint64_t size_bin_begin(int bin) {
@@ -119,16 +150,21 @@ Estimate CloudSizes::likelihood_exponent() const {
     if (in_range_ < kLeastInRange || range_.last <= range_.first) return {kNaN, kNaN};
     // The mean logarithm falls as t rises: bisection of mean(t) = the observed one.
     const double observed = log_area_ / double(in_range_);
+    const PowerSums sums(range_);
+    const double near = near_root(sums, observed);
     double low = -20, high = 40;
     for (int n = 0; n < 80; ++n) {
         const double t = (low + high) / 2;
-        const PowerSums sums = power_sums(range_, t);
-        (sums.first / sums.zeroth > observed ? low : high) = t;
+        // Far from the root rounding cannot turn the comparison.
+        const bool is_below = std::abs(t - near) > kFar ? t < near : sums.at(t).mean() > observed;
+        const bool is_last = t == low || t == high;  // no number lies between them
+        (is_below ? low : high) = t;
+        if (is_last) break;
     }
     const double t = (low + high) / 2;
     if (t < -19 || t > 39) return {kNaN, kNaN};  // all clouds at one end of the range
-    const PowerSums sums = power_sums(range_, t);
-    const double mean = sums.first / sums.zeroth, variance = sums.second / sums.zeroth - mean * mean;
+    const Sums at_t = sums.at(t);
+    const double mean = at_t.mean(), variance = at_t.second / at_t.zeroth - mean * mean;
     return {t, 1 / std::sqrt(double(in_range_) * variance)};
 }
 

@@ -7,6 +7,10 @@
 
 #include "core/error.h"
 
+// Processors with AVX-512 that count bits in vectors, three times as fast as by table look-ups.
+#ifndef HWY_WANT_AVX3_DL
+#define HWY_WANT_AVX3_DL
+#endif
 #ifndef HWY_DISABLED_TARGETS
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
 #endif
@@ -49,23 +53,56 @@ std::uint64_t count_and_not_of(const std::uint64_t* a, const std::uint64_t* b, s
     return total;
 }
 
-// Adds a level to the columns seen so far, and returns the number of columns that it adds.
-std::uint64_t add_level_to(std::uint64_t* seen, const std::uint64_t* level, std::size_t count) {
+// Returns the number of bits that are 1 in a and 0 in b, and copies b to a.
+std::uint64_t count_and_replace_of(std::uint64_t* a, const std::uint64_t* b, std::size_t count) {
     const hn::ScalableTag<std::uint64_t> d;
     const std::size_t lanes = hn::Lanes(d);
     auto sums = hn::Zero(d);
     std::size_t n = 0;
     for (; n + lanes <= count; n += lanes) {
-        const auto before = hn::LoadU(d, seen + n), bits = hn::LoadU(d, level + n);
-        sums = hn::Add(sums, hn::PopulationCount(hn::AndNot(before, bits)));
-        hn::StoreU(hn::Or(before, bits), d, seen + n);
+        const auto now = hn::LoadU(d, b + n);
+        sums = hn::Add(sums, hn::PopulationCount(hn::AndNot(now, hn::LoadU(d, a + n))));
+        hn::StoreU(now, d, a + n);
     }
     std::uint64_t total = hn::GetLane(hn::SumOfLanes(d, sums));
     for (; n < count; ++n) {
+        total += hwy::PopCount(a[n] & ~b[n]);
+        a[n] = b[n];
+    }
+    return total;
+}
+
+// Adds a level to the columns seen so far, and returns the number of columns that it adds; kCells: adds the number of its
+// cells to `cells`, too.
+template <bool kCells>
+std::uint64_t add_level(std::uint64_t* seen, const std::uint64_t* level, std::size_t count, std::uint64_t* cells) {
+    const hn::ScalableTag<std::uint64_t> d;
+    const std::size_t lanes = hn::Lanes(d);
+    auto columns = hn::Zero(d), all = hn::Zero(d);
+    std::size_t n = 0;
+    for (; n + lanes <= count; n += lanes) {
+        const auto before = hn::LoadU(d, seen + n), bits = hn::LoadU(d, level + n);
+        columns = hn::Add(columns, hn::PopulationCount(hn::AndNot(before, bits)));
+        if constexpr (kCells) all = hn::Add(all, hn::PopulationCount(bits));
+        hn::StoreU(hn::Or(before, bits), d, seen + n);
+    }
+    std::uint64_t total = hn::GetLane(hn::SumOfLanes(d, columns));
+    if constexpr (kCells) *cells += hn::GetLane(hn::SumOfLanes(d, all));
+    for (; n < count; ++n) {
         total += hwy::PopCount(level[n] & ~seen[n]);
+        if constexpr (kCells) *cells += hwy::PopCount(level[n]);
         seen[n] |= level[n];
     }
     return total;
+}
+
+std::uint64_t add_level_to(std::uint64_t* seen, const std::uint64_t* level, std::size_t count) {
+    return add_level<false>(seen, level, count, nullptr);
+}
+
+std::uint64_t count_and_add_level_to(std::uint64_t* seen, const std::uint64_t* level, std::size_t count,
+                                     std::uint64_t* cells) {
+    return add_level<true>(seen, level, count, cells);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -79,7 +116,9 @@ namespace {
 
 HWY_EXPORT(count_bits_of);
 HWY_EXPORT(count_and_not_of);
+HWY_EXPORT(count_and_replace_of);
 HWY_EXPORT(add_level_to);
+HWY_EXPORT(count_and_add_level_to);
 
 std::uint64_t count_bits(const std::uint64_t* words, std::size_t count) {
     return HWY_DYNAMIC_DISPATCH(count_bits_of)(words, count);
@@ -134,6 +173,12 @@ std::uint64_t count_deaths(const BitPlaneView& before, const BitPlaneView& after
     return HWY_DYNAMIC_DISPATCH(count_and_not_of)(before.words, after.words, before.word_count());
 }
 
+std::uint64_t count_deaths_and_replace(BitPlane& before, const BitPlaneView& after) {
+    require_one_extent(before.view(), after);
+    const std::span<std::uint64_t> words = before.words();
+    return HWY_DYNAMIC_DISPATCH(count_and_replace_of)(words.data(), after.words, words.size());
+}
+
 CloudCounts count_cloud(const BitPlaneView& cld, const Boundaries& boundaries) {
     CloudCounts counts;
     const std::size_t levels = std::size_t(cld.extent.z);
@@ -142,22 +187,23 @@ CloudCounts count_cloud(const BitPlaneView& cld, const Boundaries& boundaries) {
     counts.level_cells.resize(levels);
     counts.bases.resize(levels);
     counts.tops.resize(levels);
-    const auto add_level = [&](const std::uint64_t* level, std::vector<std::uint64_t>& seen) {
-        return HWY_DYNAMIC_DISPATCH(add_level_to)(seen.data(), level, level_words);
-    };
     std::vector<std::uint64_t> seen(level_words);
     for (std::size_t k = levels; k-- > 0;) {
-        const std::uint64_t* level = cld.words + k * level_words;
-        counts.level_cells[k] = count_bits(level, level_words);
+        counts.tops[k] = HWY_DYNAMIC_DISPATCH(count_and_add_level_to)(seen.data(), cld.words + k * level_words,
+                                                                      level_words, &counts.level_cells[k]);
         counts.cells += counts.level_cells[k];
-        if (counts.level_cells[k] != 0) counts.tops[k] = add_level(level, seen);
         counts.columns += counts.tops[k];
     }
     if (counts.columns == 0) return counts;
     counts.edges = count_edges(seen.data(), cld, boundaries);
     std::ranges::fill(seen, 0);
-    for (std::size_t k = 0; k < levels; ++k) {
-        if (counts.level_cells[k] != 0) counts.bases[k] = add_level(cld.words + k * level_words, seen);
+    // Up to where all columns have their base: above flat bases there is nothing left to find.
+    std::uint64_t left = counts.columns;
+    for (std::size_t k = 0; left > 0; ++k) {
+        if (counts.level_cells[k] == 0) continue;
+        counts.bases[k] =
+            HWY_DYNAMIC_DISPATCH(add_level_to)(seen.data(), cld.words + k * level_words, level_words);
+        left -= counts.bases[k];
     }
     return counts;
 }

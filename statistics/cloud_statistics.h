@@ -43,6 +43,9 @@ std::uint64_t count_cells(const BitPlaneView& plane);
 // extent.
 std::uint64_t count_deaths(const BitPlaneView& before, const BitPlaneView& after);
 
+// Returns count_deaths() of two planes, and makes the first one like the second.
+std::uint64_t count_deaths_and_replace(BitPlane& before, const BitPlaneView& after);
+
 // Returns the shadow of the cloud, one level of the same rows.
 BitPlane shadow_of(const BitPlaneView& cld);
 

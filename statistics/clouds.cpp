@@ -3,31 +3,52 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <optional>
 
 #include "statistics/cloud_statistics.h"
 
 namespace nephos {
 namespace {
 
+constexpr std::uint32_t kNone = ~std::uint32_t(0);
+
 // Union-find over runs: `roots` of a root is itself and the smallest of its set.
 class Sets {
   public:
-    explicit Sets(std::size_t count) : roots_(count) { std::iota(roots_.begin(), roots_.end(), 0u); }
+    explicit Sets(std::size_t count) : roots_(count), joined_(count, 0) { std::iota(roots_.begin(), roots_.end(), 0u); }
     std::uint32_t root(std::uint32_t n) {
         while (roots_[n] != n) n = roots_[n] = roots_[roots_[n]];
         return n;
     }
     void unite(std::uint32_t a, std::uint32_t b) {
-        const std::uint32_t one = root(a), other = root(b);
-        roots_[std::max(one, other)] = std::min(one, other);
+        // Nearly always two steps are enough, and how many it takes cannot be foretold.
+        std::uint32_t one = roots_[roots_[a]], other = roots_[roots_[b]];
+        if ((roots_[one] != one) | (roots_[other] != other)) {
+            one = root(one);
+            other = root(other);
+        }
+        const std::uint32_t first = std::min(one, other);
+        roots_[a] = roots_[b] = roots_[one] = roots_[other] = first;
+        joined_[a] = joined_[b] = 1;
+    }
+    // Returns true where a member is alone in its set, and was never united, not even with itself.
+    bool is_single(std::uint32_t n) const { return joined_[n] == 0; }
+    // Numbers the sets in the order of their first members, and returns how many there are.
+    std::uint32_t number(std::vector<std::uint32_t>& numbers) const {
+        numbers.resize(roots_.size());
+        std::uint32_t count = 0;
+        // What a member points to is of its set and comes before it: it has its number.
+        for (std::uint32_t n = 0; n < roots_.size(); ++n)
+            numbers[n] = roots_[n] == n ? count++ : numbers[roots_[n]];
+        return count;
     }
 
   private:
     std::vector<std::uint32_t> roots_;
+    std::vector<std::uint8_t> joined_;
 };
 
 // The sum of positions along an axis; on a periodic one of their directions around the circle.
@@ -54,269 +75,272 @@ class Centre {
     }
     double mean(const std::array<double, 2>& sum, double weight) const {
         if (!periodic_) return sum[0] / weight;
-        // A cloud that is even around the whole axis has no direction; then any place is as good.
-        if (std::hypot(sum[0], sum[1]) < 1e-9 * weight) return 0;
+        // A cloud that is even around the whole axis has no direction; then any place is as good. The length is not less
+        // than the longer side.
+        if (std::max(std::abs(sum[0]), std::abs(sum[1])) < 2e-9 * weight &&
+            std::hypot(sum[0], sum[1]) < 1e-9 * weight)
+            return 0;
         const double turn = std::atan2(sum[0], sum[1]) / (2 * std::numbers::pi);
         return (turn < 0 ? turn + 1 : turn) * cells_;
+    }
+    // Returns the mean of one cell: most clouds are no more than that.
+    double mean_of_cell(int at) {
+        if (!periodic_) return at + 0.5;
+        if (of_cells_.empty()) {
+            of_cells_.resize(std::size_t(cells_));
+            for (int n = 0; n < cells_; ++n) {
+                std::array<double, 2> sum{};
+                add(sum, n, n + 1, 1);
+                of_cells_[std::size_t(n)] = mean(sum, 1);
+            }
+        }
+        return of_cells_[std::size_t(at)];
     }
 
   private:
     int cells_;
     bool periodic_;
-    std::vector<double> sines_, cosines_;
+    std::vector<double> sines_, cosines_, of_cells_;
 };
 
-struct Sums {
-    std::array<double, 2> x{}, y{}, z{};
-    bool low_x = false, high_x = false, low_y = false, high_y = false, low_z = false, high_z = false;
-};
+// Sides of the box that a cloud touches, as bits.
+constexpr unsigned kLowX = 1, kHighX = 2, kLowY = 4, kHighY = 8, kLowZ = 16, kHighZ = 32;
+
+// Nearly always 0: no instruction that counts is worth a call.
+int count_sides(unsigned sides) {
+    int count = 0;
+    for (; sides != 0; sides &= sides - 1) ++count;
+    return count;
+}
+
+bool is_periodic(Boundary boundary) { return boundary == Boundary::periodic; }
 
 // One labelling of a plane of one or several levels.
 class Labelling {
   public:
-    Labelling(const BitPlaneView& plane, const Boundaries& boundaries, int reach)
-        : plane_(plane), runs_(runs_of(plane)), sets_(runs_.runs.size()), reach_(reach) {
-        periodic_x_ = boundaries.x == Boundary::periodic;
-        periodic_y_ = boundaries.y == Boundary::periodic;
-        periodic_z_ = boundaries.z == Boundary::periodic;
+    Labelling(const BitPlaneView& plane, const Boundaries& boundaries, Neighbours neighbours)
+        : plane_(plane), boundaries_(boundaries), numbers_(number_runs(plane)), sets_(numbers_.count()) {
+        has_levels_ = plane.extent.z > 1;
+        open_sides_ = (is_periodic(boundaries.x) ? 0 : kLowX | kHighX) |
+                      (is_periodic(boundaries.y) ? 0 : kLowY | kHighY) |
+                      (is_periodic(boundaries.z) || !has_levels_ ? 0 : kLowZ | kHighZ);
+        shared_.resize(numbers_.count());
+        join_around_x();
+        const Extent& e = plane.extent;
+        for (int k = 0; k < e.z; ++k) {
+            join_rows_of_level(k, neighbours);
+            if (has_levels_ && (k + 1 < e.z || is_periodic(boundaries.z)))
+                join(k * e.y, (k + 1) % e.z * e.y, std::size_t(e.y), 0);
+        }
+        clouds_ = sets_.number(cloud_);
     }
 
-    std::vector<ConnectedCloud> clouds(bool with_centroids) {
-        open_edges_.assign(runs_.runs.size(), 0);
-        join<true>();
-        return with_centroids ? collected<true>() : collected<false>();
-    }
-    LabelledClouds labelled() {
-        join<false>();
-        return numbered();
+    // Centroids stay 0 where they are not asked for.
+    std::vector<ConnectedCloud> clouds(bool with_centroids) const;
+
+    LabelledClouds labelled(BitPlane shadow) && {
+        std::vector<std::uint8_t> cut(clouds_, 0);
+        if (open_sides_ != 0) mark_cut(cut);
+        return {std::move(shadow), std::move(numbers_), std::move(cloud_), std::move(cut)};
     }
 
   private:
-    std::size_t first(int row) const { return runs_.rows[std::size_t(row)]; }
-    std::size_t last(int row) const { return runs_.rows[std::size_t(row) + 1]; }
+    std::uint32_t first(std::size_t row) const { return numbers_.rows[row]; }
+    std::uint32_t last(std::size_t row) const { return numbers_.rows[row + 1]; }
+    bool covers(std::size_t row, int i) const {
+        return (plane_.words[row * plane_.words_per_row + std::size_t(i) / 64] >> (i % 64) & 1) != 0;
+    }
 
-    // kEdges: counts the sides towards clear air, too.
-    template <bool kEdges>
-    void join() {
-        const Extent& e = plane_.extent;
-        for (int k = 0; k < e.z; ++k) {
-            for (int j = 0; j < e.y; ++j) {
-                join_in_row<kEdges>(k * e.y + j);
-                if (j + 1 < e.y || periodic_y_)
-                    join_rows<kEdges>(k * e.y + j, k * e.y + (j + 1) % e.y, reach_);
-                if (e.z > 1 && (k + 1 < e.z || periodic_z_))
-                    join_rows<kEdges>(k * e.y + j, (k + 1) % e.z * e.y + j, 0);
-            }
+    // The westernmost and the easternmost run of a row, where x is periodic.
+    void join_around_x() {
+        if (!is_periodic(boundaries_.x)) return;
+        for (std::size_t row = 0; row + 1 < numbers_.rows.size(); ++row) {
+            if (!covers(row, 0) || !covers(row, plane_.extent.x - 1)) continue;
+            sets_.unite(first(row), last(row) - 1);
+            shared_[first(row)] += 2;
         }
     }
 
-    // The two ends of the runs of a row, and the run that goes on around a periodic axis.
-    template <bool kEdges>
-    void join_in_row(int row) {
-        const int nx = plane_.extent.x;
-        if constexpr (kEdges) {
-            for (std::size_t n = first(row); n < last(row); ++n)
-                open_edges_[n] += unsigned(runs_.runs[n].begin > 0) + unsigned(runs_.runs[n].end < nx);
-        }
-        if (!periodic_x_ || first(row) == last(row)) return;
-        const std::size_t west = first(row), east = last(row) - 1;
-        const bool at_west = runs_.runs[west].begin == 0, at_east = runs_.runs[east].end == nx;
-        if (at_west && at_east) {
-            sets_.unite(std::uint32_t(west), std::uint32_t(east));
-        } else if constexpr (kEdges) {
-            open_edges_[west] += unsigned(at_west);
-            open_edges_[east] += unsigned(at_east);
-        }
-    }
-
-    // Rows that lie side by side; `reach` = 1 joins corners too.
-    template <bool kEdges>
-    void join_rows(int one, int other, int reach) {
-        overlaps_.resize(std::size_t(plane_.extent.x) + 2);
-        const auto first_one = std::uint32_t(first(one)), first_other = std::uint32_t(first(other));
-        const auto overlaps = [&](int shift, int longer) {
-            const std::size_t count =
-                find_overlaps(runs_.of_row(one), runs_.of_row(other), shift, longer, overlaps_.data());
-            for (std::size_t n = 0; n < count; ++n)
-                sets_.unite(first_one + overlaps_[n].one, first_other + overlaps_[n].other);
-            return count;
+    void join_rows_of_level(int k, Neighbours neighbours) {
+        const int ny = plane_.extent.y, low = k * ny;
+        const auto join_north = [&](int row, int north, int count) {
+            join(row, north, std::size_t(count), 0);
+            if (neighbours == Neighbours::four) return;
+            join(row, north, std::size_t(count), 1);
+            join(row, north, std::size_t(count), -1);
         };
-        const std::size_t count = overlaps(0, 0);
-        if constexpr (kEdges) {
-            for (std::size_t n = first(one); n < last(one); ++n) open_edges_[n] += length(n);
-            for (std::size_t n = first(other); n < last(other); ++n) open_edges_[n] += length(n);
-            for (std::size_t n = 0; n < count; ++n) {
-                open_edges_[first_one + overlaps_[n].one] -= std::uint64_t(overlaps_[n].cells);
-                open_edges_[first_other + overlaps_[n].other] -= std::uint64_t(overlaps_[n].cells);
+        join_north(low, low + 1, ny - 1);
+        if (is_periodic(boundaries_.y)) join_north(low + ny - 1, low, 1);
+    }
+
+    // Rows that lie side by side; a shift joins corners.
+    void join(int one, int other, std::size_t count, int shift) {
+        const std::span<const RunOverlap> overlaps =
+            finder_.find({plane_, numbers_, std::size_t(one)}, {plane_, numbers_, std::size_t(other)}, count,
+                         shift, boundaries_.x);
+        for (const RunOverlap& overlap : overlaps) {
+            sets_.unite(overlap.one, overlap.other);
+            if (shift == 0) shared_[overlap.one] += 2 * overlap.cells;
+        }
+    }
+
+    // Sides of the box that the cells of a row lie at, but for those of x.
+    unsigned sides_of_row(int j, int k) const {
+        const Extent& e = plane_.extent;
+        return (j == 0 ? kLowY : 0) | (j + 1 == e.y ? kHighY : 0) | (k == 0 ? kLowZ : 0) |
+               (k + 1 == e.z ? kHighZ : 0);
+    }
+
+    void mark_cut(std::vector<std::uint8_t>& cut) const {
+        for (int j = 0; j < plane_.extent.y; ++j) {
+            const auto row = std::size_t(j);
+            if ((open_sides_ & kLowX) != 0) {
+                if (covers(row, 0)) cut[cloud_[first(row)]] = 1;
+                if (covers(row, plane_.extent.x - 1)) cut[cloud_[last(row) - 1]] = 1;
             }
+            if ((sides_of_row(j, 0) & open_sides_) == 0) continue;
+            for (std::uint32_t run = first(row); run < last(row); ++run) cut[cloud_[run]] = 1;
         }
-        if (reach == 0) return;
-        overlaps(0, reach);
-        if (!periodic_x_) return;
-        overlaps(plane_.extent.x, reach);
-        overlaps(-plane_.extent.x, reach);
-    }
-
-    // Numbers the clouds by their first run. The root of a run comes before it.
-    LabelledClouds numbered() {
-        LabelledClouds result;
-        const Extent& e = plane_.extent;
-        result.cloud.resize(runs_.runs.size());
-        std::uint32_t count = 0;
-        for (std::uint32_t n = 0; n < result.cloud.size(); ++n) {
-            const std::uint32_t root = sets_.root(n);
-            result.cloud[n] = root == n ? count : result.cloud[root];
-            count += root == n;
-        }
-        result.cut.assign(count, 0);
-        const auto cut = [&](std::size_t run) { result.cut[result.cloud[run]] = 1; };
-        for (int row = 0; row < e.y; ++row) {
-            if (first(row) == last(row)) continue;
-            if (!periodic_x_ && runs_.runs[first(row)].begin == 0) cut(first(row));
-            if (!periodic_x_ && runs_.runs[last(row) - 1].end == e.x) cut(last(row) - 1);
-            if (!periodic_y_ && (row == 0 || row + 1 == e.y))
-                for (std::size_t n = first(row); n < last(row); ++n) cut(n);
-        }
-        result.shadow = std::move(runs_);
-        return result;
-    }
-
-    std::uint64_t length(std::size_t run) const {
-        return std::uint64_t(runs_.runs[run].end - runs_.runs[run].begin);
-    }
-
-    void mark_sides(ConnectedCloud& cloud, const Sums& sum) const {
-        const Extent& e = plane_.extent;
-        cloud.cut = (!periodic_x_ && (sum.low_x || sum.high_x)) ||
-                    (!periodic_y_ && (sum.low_y || sum.high_y)) ||
-                    (e.z > 1 && !periodic_z_ && (sum.low_z || sum.high_z));
-        cloud.spans = (!periodic_x_ && sum.low_x && sum.high_x) || (!periodic_y_ && sum.low_y && sum.high_y);
-    }
-
-    template <bool kCentroids>
-    std::vector<ConnectedCloud> collected() {
-        const Extent& e = plane_.extent;
-        const Centre x(e.x, kCentroids && periodic_x_), y(e.y, kCentroids && periodic_y_),
-            z(e.z, kCentroids && periodic_z_);
-        std::vector<std::uint32_t> number(runs_.runs.size());
-        std::vector<ConnectedCloud> clouds;
-        std::vector<Sums> sums;
-        for (int row = 0; row < e.y * e.z; ++row) {
-            const int j = row % e.y, k = row / e.y;
-            for (std::size_t n = first(row); n < last(row); ++n) {
-                const std::uint32_t root = sets_.root(std::uint32_t(n));
-                if (root == n) {  // the first run of its cloud
-                    number[root] = std::uint32_t(clouds.size());
-                    clouds.push_back({});
-                    clouds.back().lowest = k;
-                    sums.emplace_back();
-                }
-                ConnectedCloud& cloud = clouds[number[root]];
-                Sums& sum = sums[number[root]];
-                const CellRun run = runs_.runs[n];
-                const double cells = run.end - run.begin;
-                cloud.cells += std::uint64_t(run.end - run.begin);
-                cloud.edges += open_edges_[n];
-                cloud.lowest = std::min(cloud.lowest, k);
-                cloud.highest = std::max(cloud.highest, k);
-                if constexpr (kCentroids) {
-                    x.add(sum.x, run.begin, run.end, 1);
-                    y.add(sum.y, j, j + 1, cells);
-                    z.add(sum.z, k, k + 1, cells);
-                }
-                sum.low_x |= run.begin == 0;
-                sum.high_x |= run.end == e.x;
-                sum.low_y |= j == 0;
-                sum.high_y |= j + 1 == e.y;
-                sum.low_z |= k == 0;
-                sum.high_z |= k + 1 == e.z;
-            }
-        }
-        for (std::size_t n = 0; n < clouds.size(); ++n) {
-            ConnectedCloud& cloud = clouds[n];
-            const Sums& sum = sums[n];
-            mark_sides(cloud, sum);
-            if constexpr (!kCentroids) continue;
-            cloud.x = x.mean(sum.x, double(cloud.cells));
-            cloud.y = y.mean(sum.y, double(cloud.cells));
-            if (e.z > 1) cloud.z = z.mean(sum.z, double(cloud.cells));
-        }
-        return clouds;
     }
 
     BitPlaneView plane_;
-    CellRuns runs_;
+    Boundaries boundaries_;
+    RunNumbers numbers_;
     Sets sets_;
-    int reach_;
-    bool periodic_x_, periodic_y_, periodic_z_;
-    std::vector<std::uint64_t> open_edges_;  // of each run
-    std::vector<RunOverlap> overlaps_;       // of two rows
+    OverlapFinder finder_;
+    bool has_levels_;
+    unsigned open_sides_;
+    std::vector<int> shared_;           // of each run: faces towards other cells, those of both sides counted
+    std::vector<std::uint32_t> cloud_;  // of each run
+    std::uint32_t clouds_ = 0;
 };
 
-std::vector<ConnectedCloud> clouds_of_shadow(const BitPlaneView& cld, const Boundaries& boundaries, int reach,
-                                             bool with_centroids) {
+// Sums of positions, of a cloud of several runs.
+struct Sums {
+    std::uint32_t cloud;
+    std::array<double, 2> x{}, y{}, z{};
+};
+
+// The centroids of clouds whose runs are given one after the other.
+class Centroids {
+  public:
+    Centroids(const Extent& extent, const Boundaries& boundaries, std::size_t clouds)
+        : has_levels_(extent.z > 1),
+          x_(extent.x, is_periodic(boundaries.x)),
+          y_(extent.y, is_periodic(boundaries.y)),
+          z_(extent.z, is_periodic(boundaries.z)),
+          place_(clouds, kNone) {}
+
+    // All of a cloud of one cell.
+    void put_cell(ConnectedCloud& cloud, int i, int j, int k) {
+        cloud.x = x_.mean_of_cell(i);
+        cloud.y = y_.mean_of_cell(j);
+        if (has_levels_) cloud.z = z_.mean_of_cell(k);
+    }
+    void add(std::uint32_t cloud, const CellRun& run, int j, int k) {
+        if (place_[cloud] == kNone) {
+            place_[cloud] = std::uint32_t(sums_.size());
+            sums_.push_back({cloud});
+        }
+        Sums& sum = sums_[place_[cloud]];
+        const double weight = run.end - run.begin;
+        x_.add(sum.x, run.begin, run.end, 1);
+        y_.add(sum.y, j, j + 1, weight);
+        z_.add(sum.z, k, k + 1, weight);
+    }
+    void put_sums(std::vector<ConnectedCloud>& clouds) const {
+        for (const Sums& sum : sums_) {
+            ConnectedCloud& cloud = clouds[sum.cloud];
+            const double cells = double(cloud.cells);
+            cloud.x = x_.mean(sum.x, cells);
+            cloud.y = y_.mean(sum.y, cells);
+            if (has_levels_) cloud.z = z_.mean(sum.z, cells);
+        }
+    }
+
+  private:
+    bool has_levels_;
+    Centre x_, y_, z_;
+    std::vector<std::uint32_t> place_;  // of the sums of each cloud
+    std::vector<Sums> sums_;
+};
+
+std::vector<ConnectedCloud> Labelling::clouds(bool with_centroids) const {
+    const Extent& e = plane_.extent;
+    const std::vector<CellRun> runs = runs_of(plane_, numbers_);
+    std::vector<ConnectedCloud> clouds;
+    clouds.reserve(clouds_);
+    std::vector<std::uint8_t> sides;
+    sides.reserve(clouds_);
+    std::optional<Centroids> centroids;
+    if (with_centroids) centroids.emplace(e, boundaries_, clouds_);
+    const int open_x = (open_sides_ & kLowX) != 0;
+    std::size_t row = 0;
+    for (int k = 0; k < e.z; ++k) {
+        for (int j = 0; j < e.y; ++j, ++row) {
+            const unsigned row_sides = sides_of_row(j, k);
+            const int faces = (has_levels_ ? 4 : 2) - count_sides(row_sides & open_sides_);
+            for (std::uint32_t n = first(row); n < last(row); ++n) {
+                const CellRun run = runs[n];
+                const std::uint32_t number = cloud_[n];
+                if (number == clouds.size()) {  // the first run of its cloud
+                    clouds.push_back({.lowest = k});
+                    sides.push_back(0);
+                }
+                ConnectedCloud& cloud = clouds[number];
+                const int at_west = run.begin == 0, at_east = run.end == e.x, cells = run.end - run.begin;
+                // Those between two runs are taken off one of the two: of the cloud all are.
+                cloud.cells += std::uint64_t(cells);
+                cloud.edges += std::uint64_t(
+                    std::int64_t(faces) * cells + 2 - open_x * (at_west + at_east) - shared_[n]);
+                cloud.highest = k;
+                sides[number] = std::uint8_t(sides[number] | row_sides | (at_west ? kLowX : 0) |
+                                             (at_east ? kHighX : 0));
+                if (!centroids) continue;
+                if (cells == 1 && sets_.is_single(n)) {
+                    centroids->put_cell(cloud, run.begin, j, k);
+                } else {
+                    centroids->add(number, run, j, k);
+                }
+            }
+        }
+    }
+    for (std::size_t n = 0; n < clouds.size(); ++n) {
+        const unsigned open = sides[n] & open_sides_;
+        const auto spans = [&](unsigned both) { return (open & both) == both; };
+        clouds[n].cut = open != 0;
+        clouds[n].spans = spans(kLowX | kHighX) || spans(kLowY | kHighY);
+    }
+    if (centroids) centroids->put_sums(clouds);
+    return clouds;
+}
+
+std::vector<ConnectedCloud> clouds_of_shadow(const BitPlaneView& cld, const Boundaries& boundaries,
+                                             Neighbours neighbours, bool with_centroids) {
     const BitPlane shadow = shadow_of(cld);
-    return Labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, reach)
+    return Labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, neighbours)
         .clouds(with_centroids);
 }
 
 }  // namespace
 
-CellRuns runs_of(const BitPlaneView& plane) {
-    const std::size_t rows = std::size_t(plane.extent.y) * std::size_t(plane.extent.z);
-    CellRuns result;
-    result.rows.reserve(rows + 1);
-    std::vector<int> ends(std::size_t(plane.extent.x) + 2);  // begin, end, begin, end ... of a row
-    for (std::size_t row = 0; row < rows; ++row) {
-        result.rows.push_back(result.runs.size());
-        const std::uint64_t* words = plane.words + row * plane.words_per_row;
-        std::size_t count = 0;
-        std::uint64_t before = 0;  // the last cell of the word before
-        for (std::size_t w = 0; w < plane.words_per_row; ++w) {
-            // Where a cell differs from the one before it.
-            for (std::uint64_t turns = words[w] ^ (words[w] << 1 | before); turns != 0; turns &= turns - 1)
-                ends[count++] = int(64 * w) + std::countr_zero(turns);
-            before = words[w] >> 63;
-        }
-        if (count % 2 != 0) ends[count++] = plane.extent.x;
-        for (std::size_t n = 0; n < count; n += 2) result.runs.push_back({ends[n], ends[n + 1]});
-    }
-    result.rows.push_back(result.runs.size());
-    return result;
-}
-
-std::size_t find_overlaps(std::span<const CellRun> one, std::span<const CellRun> other, int shift, int reach,
-                          RunOverlap* overlaps) {
-    std::size_t a = 0, b = 0, count = 0;
-    // Each turn leaves one run behind. Without branches, as nobody can foretell which of the two.
-    while (a < one.size() && b < other.size()) {
-        const int begin = other[b].begin + shift - reach, end = other[b].end + shift + reach;
-        const int cells = std::min(one[a].end, end) - std::max(one[a].begin, begin);
-        overlaps[count] = {std::uint32_t(a), std::uint32_t(b), cells};
-        count += std::size_t(cells > 0);
-        const bool ends_first = one[a].end < end;
-        a += std::size_t(ends_first);
-        b += std::size_t(!ends_first);
-    }
-    return count;
-}
-
 std::vector<ConnectedCloud> clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries,
                                       Neighbours neighbours) {
-    return clouds_of_shadow(cld, boundaries, neighbours == Neighbours::eight ? 1 : 0, true);
+    return clouds_of_shadow(cld, boundaries, neighbours, true);
 }
 
 std::vector<ConnectedCloud> cloud_sizes_2d(const BitPlaneView& cld, const Boundaries& boundaries) {
-    return clouds_of_shadow(cld, boundaries, 0, false);
+    return clouds_of_shadow(cld, boundaries, Neighbours::four, false);
 }
 
 std::vector<ConnectedCloud> clouds_3d(const BitPlaneView& cld, const Boundaries& boundaries) {
-    return Labelling(cld, boundaries, 0).clouds(true);
+    return Labelling(cld, boundaries, Neighbours::four).clouds(true);
 }
 
 LabelledClouds labelled_clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries) {
-    const BitPlane shadow = shadow_of(cld);
-    return Labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, 0).labelled();
+    BitPlane shadow = shadow_of(cld);
+    Labelling labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, Neighbours::four);
+    return std::move(labelling).labelled(std::move(shadow));
 }
 
 }  // namespace nephos

@@ -16,6 +16,8 @@
 #include <span>
 #include <vector>
 
+#include "statistics/cell_runs.h"
+
 #include "automaton/lattice.h"
 
 namespace nephos {
@@ -42,40 +44,13 @@ std::vector<ConnectedCloud> clouds_3d(const BitPlaneView& cld, const Boundaries&
 // Returns the clouds of clouds_2d() with four neighbours, but all centroids 0: sizes and edges take half the time.
 std::vector<ConnectedCloud> cloud_sizes_2d(const BitPlaneView& cld, const Boundaries& boundaries);
 
-// Cells [begin, end) of a row.
-struct CellRun {
-    int begin, end;
-};
-
-// The runs of 1 bits of a plane, row after row: row j + ny k has the runs rows[j + ny k] .. rows[j + ny k + 1] - 1.
-struct CellRuns {
-    std::vector<CellRun> runs;
-    std::vector<std::size_t> rows;  // one more than there are rows
-    std::span<const CellRun> of_row(int row) const {
-        const std::size_t first = rows[std::size_t(row)];
-        return std::span(runs).subspan(first, rows[std::size_t(row) + 1] - first);
-    }
-};
-CellRuns runs_of(const BitPlaneView& plane);
-
-// Where the clouds of clouds_2d() with four neighbours are: the runs of the shadow and the number of the cloud of each.
+// Where the clouds of clouds_2d() with four neighbours are: the shadow, its runs and the number of the cloud of each.
 struct LabelledClouds {
-    CellRuns shadow;
+    BitPlane shadow;
+    RunNumbers runs;
     std::vector<std::uint32_t> cloud;  // of each run
     std::vector<std::uint8_t> cut;     // of each cloud: not 0 where it touches an open side
 };
 LabelledClouds labelled_clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries);
-
-// A run of one row that shares cells with a run of another.
-struct RunOverlap {
-    std::uint32_t one, other;  // numbers of runs
-    int cells;
-};
-
-// Writes the runs of `one` that share columns with runs of `other`, when the latter are moved by `shift` cells and made longer
-// by `reach` at both ends, to `overlaps`, which has room for one.size() + other.size(). Numbers count from the first of each.
-// Both are in the order of a row. Returns how many there are.
-std::size_t find_overlaps(std::span<const CellRun> one, std::span<const CellRun> other, int shift, int reach,
-                          RunOverlap* overlaps);
 
 }  // namespace nephos

@@ -73,9 +73,65 @@ Pulse second_maximum(std::span<const double> rho) {
     return {};
 }
 
-// tau of a whole series, of at most as many lags as half of it.
+// The deviations of a series from its mean, for its autocorrelation. Lags are summed up several at a time, each in the order
+// of the series: the sums are those of one after the other, bit for bit.
+class Deviations {
+  public:
+    explicit Deviations(std::span<const double> series)
+        : size_(series.size()), values_(series.size() + kTogether, 0.0) {
+        if (series.empty()) return;
+        const double mean = mean_of(series);
+        for (std::size_t n = 0; n < size_; ++n) {
+            values_[n] = series[n] - mean;
+            variance_ += values_[n] * values_[n];
+        }
+        // A constant has deviations of rounding alone.
+        constant_ = variance_ <= 1e-24 * std::max(1.0, mean * mean) * double(size_);
+    }
+    bool are_constant() const { return constant_; }
+
+    // Sets rho[first], rho[first + 1] ...; precondition: rho.size() <= size of the series.
+    void fill(std::span<double> rho, std::size_t first) const {
+        for (std::size_t lag = first; lag < rho.size(); lag += kTogether) {
+            // Behind the series are zeros: what they add changes no sum.
+            std::array<double, kTogether> sums{};
+            for (std::size_t n = 0; n + lag < size_; ++n)
+                for (std::size_t one = 0; one < kTogether; ++one)
+                    sums[one] += values_[n] * values_[n + lag + one];
+            for (std::size_t one = 0; one < std::min(kTogether, rho.size() - lag); ++one)
+                rho[lag + one] = sums[one] / variance_;
+        }
+    }
+    static constexpr std::size_t kTogether = 16;
+
+  private:
+    std::size_t size_;
+    std::vector<double> values_;
+    double variance_ = 0;
+    bool constant_ = true;
+};
+
+// Returns true where a pair of lags is not positive: there integrated_time() ends, whatever follows.
+bool is_integrated(std::span<const double> rho) {
+    for (std::size_t lag = 0; lag + 1 < rho.size(); lag += 2)
+        if (rho[lag] + rho[lag + 1] <= 0) return true;
+    return false;
+}
+
+// tau of a whole series, of at most as many lags as half of it. Lags beyond the first pair that is not positive do not count,
+// and are not computed.
 double tau_of(std::span<const double> values) {
-    return integrated_time(autocorrelation(values, values.size() / 2));
+    const Deviations deviations(values);
+    std::vector<double> rho(values.size() / 2 + 1, 0.0);
+    rho[0] = 1;
+    if (deviations.are_constant()) return integrated_time(rho);
+    for (std::size_t known = 1; known < rho.size();) {
+        const std::size_t next = std::min(rho.size(), known + Deviations::kTogether);
+        deviations.fill(std::span(rho).first(next), known);
+        known = next;
+        if (is_integrated(std::span(rho).first(known))) break;
+    }
+    return integrated_time(rho);
 }
 
 bool halves_agree(std::span<const double> values, double error_of_mean) {
@@ -108,22 +164,9 @@ std::string_view regime_name(Regime regime) {
 std::vector<double> autocorrelation(std::span<const double> series, std::size_t lags) {
     std::vector<double> rho(lags + 1, 0.0);
     rho[0] = 1;
-    if (series.empty()) return rho;
-    const double mean = mean_of(series);
-    std::vector<double> deviations;
-    deviations.reserve(series.size());
-    double variance = 0;
-    for (const double value : series) {
-        deviations.push_back(value - mean);
-        variance += deviations.back() * deviations.back();
-    }
-    // A constant has deviations of rounding alone.
-    if (variance <= 1e-24 * std::max(1.0, mean * mean) * double(series.size())) return rho;
-    for (std::size_t lag = 1; lag <= lags && lag < series.size(); ++lag) {
-        double sum = 0;
-        for (std::size_t n = 0; n + lag < deviations.size(); ++n) sum += deviations[n] * deviations[n + lag];
-        rho[lag] = sum / variance;
-    }
+    const Deviations deviations(series);
+    if (deviations.are_constant()) return rho;
+    deviations.fill(std::span(rho).first(std::min(lags + 1, series.size())), 1);
     return rho;
 }
 

@@ -2,36 +2,19 @@
 #include "statistics/structure.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
+
+#include "statistics/row_shift.h"
 
 namespace nephos {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// Moves a row by `cells` towards west: bit i becomes that of i + cells; 0 flows in.
-void shifted_west(const std::uint64_t* row, std::size_t words, int cells, std::uint64_t* to) {
-    const std::size_t whole = std::size_t(cells) / 64;
-    const unsigned bits = unsigned(cells) % 64;
-    for (std::size_t n = 0; n < words; ++n) {
-        const std::uint64_t low = n + whole < words ? row[n + whole] : 0;
-        const std::uint64_t high = n + whole + 1 < words ? row[n + whole + 1] : 0;
-        to[n] = bits == 0 ? low : low >> bits | high << (64 - bits);
-    }
-}
-
-// Moves a row by `cells` towards east; 0 flows in, and bits beyond the last cell are cleared by the caller's AND.
-void shifted_east(const std::uint64_t* row, std::size_t words, int cells, std::uint64_t* to) {
-    const std::size_t whole = std::size_t(cells) / 64;
-    const unsigned bits = unsigned(cells) % 64;
-    for (std::size_t n = 0; n < words; ++n) {
-        const std::uint64_t high = n >= whole ? row[n - whole] : 0;
-        const std::uint64_t low = n >= whole + 1 ? row[n - whole - 1] : 0;
-        to[n] = bits == 0 ? high : high << bits | low >> (64 - bits);
-    }
-}
+double columns_of(const Extent& extent) { return double(extent.x) * extent.y; }
 
 // Pairs of covered columns `r` apart, and all pairs.
 struct Pairs {
@@ -45,8 +28,8 @@ Pairs pairs_along_x(const BitPlaneView& shadow, int r, bool periodic) {
     std::vector<std::uint64_t> moved(words), wrapped(words);
     for (int j = 0; j < ny; ++j) {
         const std::uint64_t* row = shadow.row(j, 0);
-        shifted_west(row, words, r, moved.data());
-        if (periodic) shifted_east(row, words, nx - r, wrapped.data());
+        move_row(row, words, -r, moved.data());
+        if (periodic) move_row(row, words, nx - r, wrapped.data());
         for (std::size_t n = 0; n < words; ++n) both.row(j, 0)[n] = row[n] & (moved[n] | wrapped[n]);
     }
     return {double(count_cells(both.view())), double(ny) * (periodic ? nx : nx - r)};
@@ -62,10 +45,42 @@ Pairs pairs_along_y(const BitPlaneView& shadow, int r, bool periodic) {
     return {double(count_cells(both.view())), double(rows) * shadow.extent.x};
 }
 
+// rho of a shadow.
+class CorrelationOf {
+  public:
+    CorrelationOf(const BitPlaneView& shadow, const Boundaries& boundaries)
+        : shadow_(shadow),
+          periodic_x_(boundaries.x == Boundary::periodic),
+          periodic_y_(boundaries.y == Boundary::periodic),
+          cover_(double(count_cells(shadow)) / columns_of(shadow.extent)) {}
+
+    // The greatest distance.
+    int most() const { return std::min(shadow_.extent.x, shadow_.extent.y) / 2; }
+    double at(int r) const {
+        const Pairs x = pairs_along_x(shadow_, r, periodic_x_), y = pairs_along_y(shadow_, r, periodic_y_);
+        const double variance = cover_ - cover_ * cover_;
+        const double mean = (x.covered + y.covered) / (x.all + y.all);
+        return variance > 0 ? (mean - cover_ * cover_) / variance : kNaN;
+    }
+
+  private:
+    BitPlaneView shadow_;
+    bool periodic_x_, periodic_y_;
+    double cover_;
+};
+
+// 1, 2, 3, 4, 6, 8, 12, 16 ...
+int next_distance(int r) {
+    if (r < 4) return r + 1;
+    return r + int(std::bit_floor(unsigned(r))) / 2;
+}
+
+constexpr double kLength = 1 / std::numbers::e;  // of the correlation at the correlation length
+
 std::vector<LevelOverlap> overlaps_up_to(const BitPlaneView& cld, int most) {
     const int nz = cld.extent.z;
     const std::size_t level_words = cld.words_per_row * std::size_t(cld.extent.y);
-    const double columns = double(cld.extent.x) * cld.extent.y;
+    const double columns = columns_of(cld.extent);
     std::vector<double> cover(std::size_t(nz), 0.0);
     const auto level = [&](int k) { return cld.words + std::size_t(k) * level_words; };
     const Extent flat{cld.extent.x, cld.extent.y, 1};
@@ -118,33 +133,33 @@ double overlap_length_m(const std::vector<LevelOverlap>& overlaps, double cell_s
 }
 
 std::vector<Correlation> shadow_correlation(const BitPlaneView& shadow, const Boundaries& boundaries) {
-    const Extent& e = shadow.extent;
-    const double cover = double(count_cells(shadow)) / (double(e.x) * e.y);
+    const CorrelationOf correlation(shadow, boundaries);
     std::vector<Correlation> result;
-    const int most = std::min(e.x, e.y) / 2;
-    for (int r = 1, step = 1; r <= most; r += step) {
-        const Pairs x = pairs_along_x(shadow, r, boundaries.x == Boundary::periodic);
-        const Pairs y = pairs_along_y(shadow, r, boundaries.y == Boundary::periodic);
-        const double variance = cover - cover * cover;
-        const double mean = (x.covered + y.covered) / (x.all + y.all);
-        result.push_back({r, variance > 0 ? (mean - cover * cover) / variance : kNaN});
-        if (r >= 4 && (r & (r - 1)) == 0) step = r / 2;
-    }
+    for (int r = 1; r <= correlation.most(); r = next_distance(r)) result.push_back({r, correlation.at(r)});
     return result;
 }
 
 double correlation_length_m(const std::vector<Correlation>& correlation, double cell_size_m) {
-    const double limit = 1 / std::numbers::e;
     Correlation before{0, 1};
     for (const Correlation& now : correlation) {
         if (std::isnan(now.value)) return kNaN;
-        if (now.value < limit) {
-            const double part = (before.value - limit) / (before.value - now.value);
+        if (now.value < kLength) {
+            const double part = (before.value - kLength) / (before.value - now.value);
             return (before.distance + part * (now.distance - before.distance)) * cell_size_m;
         }
         before = now;
     }
     return kNaN;
+}
+
+double correlation_length_m(const BitPlaneView& shadow, const Boundaries& boundaries, double cell_size_m) {
+    const CorrelationOf correlation(shadow, boundaries);
+    std::vector<Correlation> known;
+    for (int r = 1; r <= correlation.most(); r = next_distance(r)) {
+        known.push_back({r, correlation.at(r)});
+        if (!(known.back().value >= kLength)) break;
+    }
+    return correlation_length_m(known, cell_size_m);
 }
 
 }  // namespace nephos

@@ -47,7 +47,9 @@ struct Correlation {
 // Returns rho at r = 1, 2, 3, 4, 6, 8, 12, 16 ... up to half the shorter side. Thread-safe.
 std::vector<Correlation> shadow_correlation(const BitPlaneView& shadow, const Boundaries& boundaries);
 
-// Returns the distance in metres at which rho falls below 1/e, linear between the distances; NaN where it never does.
+// Return the distance in metres at which rho falls below 1/e, linear between the distances; NaN where it never does. Of a
+// shadow rho is computed no farther than that.
 double correlation_length_m(const std::vector<Correlation>& correlation, double cell_size_m);
+double correlation_length_m(const BitPlaneView& shadow, const Boundaries& boundaries, double cell_size_m);
 
 }  // namespace nephos

@@ -2,9 +2,9 @@
 #include "statistics/tracks.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "statistics/cloud_statistics.h"
 
@@ -14,111 +14,136 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint32_t kNone = ~std::uint32_t(0);
 
-// The runs of the columns with cloud in the levels of one shift, and the cloud of the whole shadow that each belongs to.
-struct Pieces {
-    CellRuns runs;
-    std::vector<std::uint32_t> cloud;
-};
-
-Pieces pieces_of_shift(const BitPlaneView& cld, const LabelledClouds& clouds,
-                       std::span<const CellShift> shifts, const CellShift& shift) {
+// The columns with cloud in the levels of one shift.
+BitPlane shadow_of_shift(const BitPlaneView& cld, std::span<const CellShift> shifts, const CellShift& shift) {
     BitPlane part({cld.extent.x, cld.extent.y, 1});
+    const std::span<std::uint64_t> to = part.words();
     for (int k = 0; k < cld.extent.z; ++k) {
         if (!(shifts[std::size_t(k)] == shift)) continue;
-        for (int j = 0; j < cld.extent.y; ++j)
-            for (std::size_t w = 0; w < cld.words_per_row; ++w) part.row(j, 0)[w] |= cld.row(j, k)[w];
+        const std::uint64_t* level = cld.row(0, k);
+        for (std::size_t n = 0; n < to.size(); ++n) to[n] |= level[n];
     }
-    Pieces pieces{runs_of(part.view()), {}};
-    for (std::size_t row = 0; row + 1 < pieces.runs.rows.size(); ++row) {
-        std::size_t whole = clouds.shadow.rows[row];
-        for (std::size_t n = pieces.runs.rows[row]; n < pieces.runs.rows[row + 1]; ++n) {
-            while (clouds.shadow.runs[whole].end <= pieces.runs.runs[n].begin) ++whole;
-            pieces.cloud.push_back(clouds.cloud[whole]);
+    return part;
+}
+
+// Rows of the step before, and where they lie now.
+struct MovedRows {
+    int before, now, count;
+};
+
+// Cuts the rows of a level, moved by `shift`, where they wrap around or leave the box.
+std::vector<MovedRows> moved_rows(int rows, std::int64_t shift, Boundary boundary) {
+    if (boundary == Boundary::periodic) {
+        const int to = int((shift % rows + rows) % rows);
+        return {{0, to, rows - to}, {rows - to, 0, to}};
+    }
+    if (shift <= -rows || shift >= rows) return {};
+    const int way = int(shift);
+    return {{std::max(0, -way), std::max(0, way), rows - std::abs(way)}};
+}
+
+// Cells along x; beyond an open side, and far beyond, nothing is shared.
+int moved_columns(int columns, std::int64_t shift, Boundary boundary) {
+    if (boundary == Boundary::periodic) return int((shift % columns + columns) % columns);
+    return int(std::clamp<std::int64_t>(shift, -columns, columns));
+}
+
+// Spreads pairs of clouds over 64 bits (the finaliser of MurmurHash3).
+std::uint64_t mixed(std::uint64_t pair) {
+    pair = (pair ^ pair >> 33) * 0xff51afd7ed558ccd;
+    return pair ^ pair >> 33;
+}
+
+// Sums up the columns of equal pairs of clouds; their order is any.
+std::vector<SharedColumns> summed(std::span<const SharedColumns> shared) {
+    std::vector<std::uint32_t> places(std::bit_ceil(2 * shared.size() + 1), kNone);
+    const std::size_t last = places.size() - 1;
+    std::vector<SharedColumns> sums;
+    sums.reserve(shared.size());
+    for (const SharedColumns& one : shared) {
+        std::size_t at = mixed(std::uint64_t(one.before) << 32 | one.now) & last;
+        while (places[at] != kNone && (sums[places[at]].before != one.before || sums[places[at]].now != one.now))
+            at = (at + 1) & last;
+        if (places[at] == kNone) {
+            places[at] = std::uint32_t(sums.size());
+            sums.push_back(one);
+        } else {
+            sums[places[at]].columns += one.columns;
         }
     }
-    return pieces;
+    return sums;
 }
 
-// The place of a row or column after a shift; -1 beyond an open side.
-int moved(std::int64_t at, std::int64_t by, int cells, Boundary boundary) {
-    std::int64_t to = at + by;
-    if (boundary == Boundary::periodic) return int((to % cells + cells) % cells);
-    return to >= 0 && to < cells ? int(to) : -1;
-}
-
-// Sorts what a cloud shares by the cloud that it shares it with. Most share with one or two.
-template <class Iterator>
-void sort_by_cloud_now(Iterator first, Iterator last) {
-    constexpr std::ptrdiff_t kFew = 12;
-    if (last - first > kFew) {
-        std::sort(first, last, [](const auto& a, const auto& b) { return a.now < b.now; });
-        return;
+// For clouds of one step those of the other that they share columns with: the only one, or that there are several.
+class Partners {
+  public:
+    explicit Partners(std::size_t clouds) : only(clouds, kNone), several(clouds, 0) {}
+    void meet(std::uint32_t cloud, std::uint32_t partner) {
+        const std::uint32_t known = only[cloud];
+        only[cloud] = std::min(known, partner);
+        several[cloud] |= std::uint8_t((known != kNone) & (known != partner));
     }
-    for (auto one = first; one != last; ++one) {
-        const auto moving = *one;
-        auto to = one;
-        for (; to != first && (to - 1)->now > moving.now; --to) *to = *(to - 1);
-        *to = moving;
-    }
-}
+    std::vector<std::uint32_t> only;  // the first in memory of several
+    std::vector<std::uint8_t> several;
+};
 
 }  // namespace
 
-std::vector<Tracker::Shared> Tracker::shared_columns(const LabelledClouds& now,
-                                                     std::span<const CellShift> shifts) const {
+// Moves the clouds of the step before, and returns what they share with those of now, in pieces.
+std::vector<SharedColumns> Tracker::shared_columns(const LabelledClouds& now, std::span<const CellShift> shifts) {
     const Extent extent = cld_.extent();
     std::vector<CellShift> different;
     for (const CellShift& shift : shifts)
         if (std::ranges::count(different, shift) == 0) different.push_back(shift);
-    std::vector<Shared> shared;
-    shared.reserve(clouds_.cloud.size() + now.cloud.size());
-    std::vector<RunOverlap> overlaps(std::size_t(extent.x) + 2);
-    const bool periodic = boundaries_.x == Boundary::periodic;
+    std::vector<SharedColumns> shared;
     for (const CellShift& shift : different) {
         const bool whole = different.size() == 1;
-        const Pieces part = whole ? Pieces{} : pieces_of_shift(cld_.view(), clouds_, shifts, shift);
-        const CellRuns& before = whole ? clouds_.shadow : part.runs;
-        const std::vector<std::uint32_t>& cloud = whole ? clouds_.cloud : part.cloud;
-        // Beyond an open side, and far beyond, nothing is shared.
-        const int dx = int(std::clamp<std::int64_t>(
-            periodic ? moved(0, shift.x, extent.x, Boundary::periodic) : shift.x, -extent.x, extent.x));
-        for (int row = 0; row < extent.y; ++row) {
-            const int to = moved(row, shift.y, extent.y, boundaries_.y);
-            if (to < 0) continue;
-            const std::uint32_t* cloud_now = now.cloud.data() + now.shadow.rows[std::size_t(to)];
-            const std::uint32_t* cloud_before = cloud.data() + before.rows[std::size_t(row)];
-            const auto meet = [&](int by) {
-                const std::size_t count =
-                    find_overlaps(now.shadow.of_row(to), before.of_row(row), by, 0, overlaps.data());
-                for (std::size_t n = 0; n < count; ++n)
-                    shared.push_back({cloud_before[overlaps[n].other], cloud_now[overlaps[n].one],
-                                      std::uint64_t(overlaps[n].cells)});
-            };
-            meet(dx);
-            if (periodic && dx != 0) meet(dx - extent.x);
+        const BitPlane part = whole ? BitPlane() : shadow_of_shift(cld_.view(), shifts, shift);
+        const BitPlaneView before = whole ? clouds_.shadow.view() : part.view();
+        const int dx = moved_columns(extent.x, shift.x, boundaries_.x);
+        for (const MovedRows& rows : moved_rows(extent.y, shift.y, boundaries_.y)) {
+            const std::span<const RunOverlap> overlaps =
+                finder_.find({now.shadow.view(), now.runs, std::size_t(rows.now)},
+                             {before, clouds_.runs, std::size_t(rows.before)}, std::size_t(rows.count), dx,
+                             boundaries_.x);
+            shared.reserve(shared.size() + overlaps.size());
+            for (const RunOverlap& overlap : overlaps)
+                shared.push_back({clouds_.cloud[overlap.other], now.cloud[overlap.one],
+                                  std::uint64_t(overlap.cells)});
         }
     }
-    // By cloud before, and of each of those, which are few, by cloud now.
-    std::vector<std::size_t> begins(clouds_.cut.size() + 1, 0);
-    for (const Shared& one : shared) ++begins[one.before + 1];
-    std::partial_sum(begins.begin(), begins.end(), begins.begin());
-    std::vector<Shared> sorted(shared.size());
-    std::vector<std::size_t> places(begins.begin(), begins.end() - 1);
-    for (const Shared& one : shared) sorted[places[one.before]++] = one;
-    std::vector<Shared> sums;
-    sums.reserve(sorted.size());
-    for (std::size_t n = 0; n + 1 < begins.size(); ++n) {
-        const auto first = sorted.begin() + std::ptrdiff_t(begins[n]),
-                   last = sorted.begin() + std::ptrdiff_t(begins[n + 1]);
-        sort_by_cloud_now(first, last);
-        for (auto one = first; one != last; ++one) {
-            if (one != first && sums.back().now == one->now)
-                sums.back().columns += one->columns;
-            else
-                sums.push_back(*one);
+    return shared;
+}
+
+// Most clouds meet one other at most: only where there are several does it matter how many columns they share.
+Tracker::Choices Tracker::choose(std::span<const SharedColumns> shared, std::size_t clouds_now) const {
+    Partners before(clouds_.cut.size()), now(clouds_now);
+    for (const SharedColumns& s : shared) {
+        before.meet(s.before, s.now);
+        now.meet(s.now, s.before);
+    }
+    std::vector<SharedColumns> contested(shared.size());
+    std::size_t count = 0;
+    for (const SharedColumns& s : shared) {
+        contested[count] = s;
+        count += std::size_t(before.several[s.before] | now.several[s.now]);
+    }
+    contested.resize(count);
+    std::vector<std::uint64_t> most_before(before.only.size(), 0), most_now(clouds_now, 0);
+    Choices choices{std::move(before.only), std::move(now.only)};
+    for (const SharedColumns& s : summed(contested)) {
+        std::uint32_t &heir = choices.heir[s.before], &parent = choices.parent[s.now];
+        if (s.columns > most_before[s.before] || (s.columns == most_before[s.before] && s.now < heir)) {
+            most_before[s.before] = s.columns;
+            heir = s.now;
+        }
+        if (s.columns > most_now[s.now] ||
+            (s.columns == most_now[s.now] && identity_[s.before] < identity_[parent])) {
+            most_now[s.now] = s.columns;
+            parent = s.before;
         }
     }
-    return sums;
+    return choices;
 }
 
 void Tracker::add(const BitPlaneView& cld, std::span<const CellShift> shifts) {
@@ -126,25 +151,13 @@ void Tracker::add(const BitPlaneView& cld, std::span<const CellShift> shifts) {
     const std::size_t count = now.cut.size();
     std::vector<Track> current(count);
     std::vector<std::uint64_t> identity(count);
-    std::vector<std::uint32_t> heir(clouds_.cut.size(), kNone), parent(count, kNone);
-    if (states_ > 0) {
-        std::vector<std::uint64_t> most_before(heir.size(), 0), most_now(count, 0);
-        for (const Shared& s : shared_columns(now, shifts)) {
-            if (s.columns > most_before[s.before]) {
-                most_before[s.before] = s.columns;
-                heir[s.before] = s.now;
-            }
-            if (s.columns > most_now[s.now] ||
-                (s.columns == most_now[s.now] && identity_[s.before] < identity_[parent[s.now]])) {
-                most_now[s.now] = s.columns;
-                parent[s.now] = s.before;
-            }
-        }
-        for (std::size_t n = 0; n < heir.size(); ++n) {
-            if (heir[n] != kNone && parent[heir[n]] == n) continue;
-            current_[n].end = heir[n] == kNone ? TrackEnd::death : TrackEnd::merger;
-            ended_.push_back(current_[n]);
-        }
+    Choices choices{{}, std::vector<std::uint32_t>(count, kNone)};
+    if (states_ > 0) choices = choose(shared_columns(now, shifts), count);
+    const auto& [heir, parent] = choices;
+    for (std::size_t n = 0; n < heir.size(); ++n) {
+        if (heir[n] != kNone && parent[heir[n]] == n) continue;
+        current_[n].end = heir[n] == kNone ? TrackEnd::death : TrackEnd::merger;
+        ended_.push_back(current_[n]);
     }
     for (std::size_t n = 0; n < count; ++n) {
         if (parent[n] != kNone && heir[parent[n]] == n) {

@@ -51,6 +51,12 @@ struct Track {
     auto operator<=>(const Track&) const = default;
 };
 
+// Columns that a cloud of one step shares with one of the next; numbers of clouds.
+struct SharedColumns {
+    std::uint32_t before, now;
+    std::uint64_t columns;
+};
+
 // Follows clouds through states that are given one after the other.
 class Tracker {
   public:
@@ -64,11 +70,12 @@ class Tracker {
     std::vector<Track> tracks() const;
 
   private:
-    struct Shared {
-        std::uint32_t before, now;  // numbers of clouds
-        std::uint64_t columns;
+    // Of each cloud before the one that shares most columns with it now, and the other way round; none where all bits are 1.
+    struct Choices {
+        std::vector<std::uint32_t> heir, parent;
     };
-    std::vector<Shared> shared_columns(const LabelledClouds& now, std::span<const CellShift> shifts) const;
+    std::vector<SharedColumns> shared_columns(const LabelledClouds& now, std::span<const CellShift> shifts);
+    Choices choose(std::span<const SharedColumns> shared, std::size_t clouds_now) const;
 
     Boundaries boundaries_;
     std::uint32_t states_ = 0;
@@ -78,6 +85,7 @@ class Tracker {
     std::vector<std::uint64_t> identity_;  // of each of them: lower is older
     std::uint64_t next_identity_ = 0;
     std::vector<Track> ended_;
+    OverlapFinder finder_;
 };
 
 struct TrackStatistics {

@@ -376,7 +376,7 @@ Shard::~Shard() {
 }
 
 void Shard::add(const PlannedRun& run, const RunResult& result) {
-    const std::string packed = pack_series(result.series);
+    const std::string packed = pack_series(result.series, result.scales);
     lines_ += record_line(run, result, series_bytes_ + series_.size(), packed.size());
     series_ += packed;
     flush_if_due();

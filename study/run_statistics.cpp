@@ -29,6 +29,20 @@ bool has_wind(const Wind& wind) {
     return !wind.fields.empty();
 }
 
+// Cells, columns, edges and sums of levels over columns are whole numbers. In the order of kSeries.
+std::array<SeriesScale, kSeries.size()> series_scales(const Extent& extent, const Placement& placement) {
+    const double cell_m = placement.cell_size_m, floor_m = placement.origin_m.z;
+    const double cells = double(extent.cells()), columns = double(extent.x) * extent.y;
+    constexpr int kCover = 0;
+    return {{{.divisor = columns},
+             {.divisor = cells},
+             {.divisor = cells},
+             {.divisor = cells},
+             {.offset = floor_m, .scale = cell_m, .by = kCover},
+             {.offset = floor_m + cell_m, .scale = cell_m, .by = kCover},
+             {.scale = edge_per_km(cell_m, extent, cell_m)}}};
+}
+
 // The sizes of clouds at a step.
 struct StepSizes {
     std::uint64_t step;
@@ -56,10 +70,6 @@ class Measurement {
 
     void step() {
         if (options_.tracks) note_shifts();
-        if (counts_deaths_) {
-            const BitPlaneView before = automaton().cld();
-            before_.assign(before.words, before.words + before.word_count());
-        }
         for (LayerSimulation& layer : layers_) layer.step();
         observe();
     }
@@ -104,10 +114,11 @@ class Measurement {
     double activation_;
     bool counts_deaths_ = false;
     SizeRange size_range_;
-    std::vector<std::uint64_t> before_;          // words of cld before the step
+    BitPlane before_;                            // cld of the last observed state, where deaths are counted
     std::array<std::vector<double>, 7> series_;  // kSeries
     std::array<std::vector<double>, 4>
         sampled_;                         // clouds_per_km2, cloud_area_m2, correlation_length_m, overlap
+    std::uint64_t cells_before_ = 0;      // of cloud, in that state
     std::vector<double> cells_, deaths_;  // of each step
     std::vector<std::uint32_t> levels_;   // cloud cells of each level, step by step
     std::vector<StepSizes> snapshots_;
@@ -126,14 +137,18 @@ void Measurement::observe() {
     series_[5].push_back(s.top_mean_m);
     series_[6].push_back(edge_per_km(s.perimeter_m, lattice_.extent, lattice_.placement.cell_size_m));
     for (const std::uint64_t level : counts.level_cells) levels_.push_back(std::uint32_t(level));
-    if (counts_deaths_ && !before_.empty()) {
-        const BitPlaneView before{cld.extent, cld.words_per_row, before_.data()};
-        cells_.push_back(double(count_cells(before)));
-        deaths_.push_back(double(count_deaths(before, cld)));
+    if (counts_deaths_ && steps() > 0) {
+        cells_.push_back(double(cells_before_));
+        deaths_.push_back(double(count_deaths_and_replace(before_, cld)));
     } else {
+        if (counts_deaths_) {
+            before_ = BitPlane(cld.extent);
+            count_deaths_and_replace(before_, cld);
+        }
         cells_.push_back(0);
         deaths_.push_back(0);
     }
+    cells_before_ = counts.cells;
     if (options_.tracks) tracker_.add(cld, shifts_);
     if (options_.clouds_every > 0 && steps() % std::uint64_t(options_.clouds_every) == 0)
         observe_clouds(cld, steps());
@@ -229,6 +244,7 @@ RunResult Measurement::result(const Judgement& judgement) const {
     result.state_hash = combined_hash(layers_).hex();
     for (const std::vector<double>& series : series_)
         for (const double value : series) result.series.push_back(float(value));
+    result.scales = series_scales(lattice_.extent, lattice_.placement);
     result.thumbnail = thumbnail_of(automaton().cld());
     return result;
 }

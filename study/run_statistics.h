@@ -59,6 +59,13 @@ inline constexpr std::array<SeriesInfo, 7> kSeries{{
     {"edge_per_km", "", "km-1", "length of the cloud edge per area"},
 }};
 
+// How the values of a series come from whole numbers n = 0, 1, 2 .., by which its record stores them:
+// offset + n / divisor * scale; NaN where the divisor is 0.
+struct SeriesScale {
+    double offset = 0, divisor = 1, scale = 1;
+    int by = -1;  // not -1: the divisor of each value is n of this series, one that comes before
+};
+
 // What is known of the tracks of a run, in the order of tracks.csv; NaN without value. Of the steps that the means are over.
 inline constexpr std::array<StatisticInfo, 12> kTrackColumns{{
     {"births", "1", "clouds that share no column with those of the step before"},
@@ -87,6 +94,7 @@ struct RunResult {
     std::vector<double> tracks;  // kTrackColumns; empty where clouds were not followed
     std::string state_hash;      // after the last step
     std::vector<float> series;   // kSeries one after the other, steps + 1 values each
+    std::array<SeriesScale, kSeries.size()> scales;
     std::string thumbnail;       // of the last state, thumbnail.h; a sweep keeps that of the first replicate
 };
 

@@ -25,7 +25,7 @@ Snapshot take_snapshot(const BitPlaneView& cld, const Boundaries& boundaries, do
     snapshot.values = {
         number / area_km2,
         clouds.empty() ? kNaN : double(snapshot.sizes.area()) / number * cell_size_m * cell_size_m,
-        correlation_length_m(shadow_correlation(shadow_of(cld).view(), boundaries), cell_size_m),
+        correlation_length_m(shadow_of(cld).view(), boundaries, cell_size_m),
         mean_overlap_of_neighbours(cld)};
     return snapshot;
 }

@@ -33,6 +33,7 @@ std::string packed(const RunResult& result) {
     writer.put(result.regime);
     writer.put(std::array{result.steps, result.warm_up, result.used, result.period, result.snapshots});
     writer.put(result.statistics);
+    writer.put(result.scales);
     writer.put(std::array{std::uint64_t(result.tracks.size()), std::uint64_t(result.profile.size()),
                           std::uint64_t(result.sizes.size()), std::uint64_t(result.series.size()),
                           std::uint64_t(result.state_hash.size()), std::uint64_t(result.thumbnail.size())});
@@ -59,6 +60,7 @@ RunResult unpacked(const std::string& text) {
     result.period = counts[3];
     result.snapshots = counts[4];
     result.statistics = reader.get<decltype(result.statistics)>();
+    result.scales = reader.get<decltype(result.scales)>();
     const auto sizes = reader.get<std::array<std::uint64_t, 6>>();
     result.tracks.resize(sizes[0]);
     result.profile.resize(sizes[1]);

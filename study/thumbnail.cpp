@@ -61,6 +61,8 @@ std::string thumbnail_of(const BitPlaneView& cld) {
                 for (std::uint64_t bits = row[word]; bits != 0; bits &= bits - 1)
                     ++depths[linear_index(extent, word * 64 + std::countr_zero(bits), j, 0)];
         }
+    std::vector<double> whiteness(std::size_t(extent.z) + 1);  // of a column of so many cells
+    for (std::size_t n = 0; n < whiteness.size(); ++n) whiteness[n] = 1 - std::exp(-int(n) / kDepth);
     const int square = (std::max(extent.x, extent.y) + kSide - 1) / kSide;
     const int width = (extent.x + square - 1) / square, height = (extent.y + square - 1) / square;
     std::vector<std::uint8_t> pixels;
@@ -70,7 +72,7 @@ std::string thumbnail_of(const BitPlaneView& cld) {
             int columns = 0;
             for (int j = y * square; j < std::min((y + 1) * square, extent.y); ++j)
                 for (int i = x * square; i < std::min((x + 1) * square, extent.x); ++i, ++columns)
-                    sum += 1 - std::exp(-depths[linear_index(extent, i, j, 0)] / kDepth);
+                    sum += whiteness[std::size_t(depths[linear_index(extent, i, j, 0)])];
             pixels.push_back(std::uint8_t(std::lround(sum / columns * (kGreys - 1)) * (255 / (kGreys - 1))));
         }
     return base64(grey_png(pixels, width, height));

@@ -85,7 +85,7 @@ BenchRow series_row() {
     const auto [ours, other] = interleave(
         kRounds,
         [&] {
-            series = pack_series(run.series).size();
+            series = pack_series(run.series, run.scales).size();
             record = record_line(planned, run, 0, series).size();
         },
         [&] { step_alone(scene); });

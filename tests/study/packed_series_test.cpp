@@ -44,6 +44,59 @@ TEST(PackedSeries, CoverOverTimeIsSmall) {
     EXPECT_LT(pack_series(std::vector<float>(10000, 0.25F)).size(), 200u);
 }
 
+// Cover, cloud cells and mean base of a small lattice over time; without cloud a base is NaN.
+struct Scaled {
+    std::vector<float> values;
+    std::vector<SeriesScale> scales{{.divisor = 600}, {.divisor = 4200}, {.offset = 350, .scale = 50, .by = 0}};
+};
+
+Scaled scaled_series(std::size_t steps) {
+    std::mt19937_64 random(3);
+    Scaled result;
+    std::vector<std::uint64_t> columns, levels;
+    for (std::size_t n = 0; n < steps; ++n) columns.push_back(n % 50 == 0 ? 0 : 150 + random() % 40);
+    for (const std::uint64_t column : columns) result.values.push_back(float(double(column) / 600));
+    for (const std::uint64_t column : columns) result.values.push_back(float(double(2 * column) / 4200));
+    for (const std::uint64_t column : columns)
+        result.values.push_back(column == 0 ? std::numeric_limits<float>::quiet_NaN()
+                                            : float(350 + double(3 * column + random() % 90) / double(column) * 50));
+    return result;
+}
+
+void expect_bits_back(const std::vector<float>& values, const std::string& packed) {
+    const std::vector<float> back = unpack_series(packed, values.size());
+    ASSERT_EQ(back.size(), values.size());
+    for (std::size_t n = 0; n < values.size(); ++n)
+        EXPECT_EQ(std::bit_cast<std::uint32_t>(back[n]), std::bit_cast<std::uint32_t>(values[n])) << n;
+}
+
+TEST(PackedSeries, QuotientsOfWholeNumbersComeBack) {
+    const Scaled series = scaled_series(301);
+    const std::string packed = pack_series(series.values, series.scales), plain = pack_series(series.values);
+    expect_bits_back(series.values, packed);
+    EXPECT_LT(3 * packed.size(), 2 * plain.size());
+    for (std::size_t at = 0; at < packed.size(); ++at) {
+        std::string damaged = packed;
+        damaged[at] = char(damaged[at] ^ 0x55);
+        EXPECT_THROW(unpack_series(damaged, series.values.size()), Error) << at;
+        EXPECT_THROW(unpack_series(packed.substr(0, at), series.values.size()), Error) << at;
+    }
+    EXPECT_THROW(unpack_series(packed, series.values.size() - 3), Error);
+    EXPECT_THROW(unpack_series(packed, series.values.size() + 3), Error);
+}
+
+// One value that is no such quotient, and the series that are divided by its series: floats, as they are.
+TEST(PackedSeries, WhatIsNoQuotientComesBackToo) {
+    for (const std::size_t odd : {0u, 5u, 300u, 301u, 900u}) {
+        for (const float value : {0.123F, -1.0F, std::numeric_limits<float>::infinity(), -0.0F}) {
+            Scaled series = scaled_series(301);
+            series.values[odd] = value;
+            expect_bits_back(series.values, pack_series(series.values, series.scales));
+        }
+    }
+    expect_bits_back({}, pack_series({}, scaled_series(1).scales));
+}
+
 TEST(PackedSeries, DamageIsSeen) {
     std::vector<float> values;
     for (int n = 0; n < 100; ++n) values.push_back(float(std::sin(n)));
