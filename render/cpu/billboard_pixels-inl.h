@@ -17,7 +17,7 @@
 
 #include <hwy/highway.h>
 
-#include "render/cpu/billboard_texels.h"
+#include "render/frame/billboard_textures.h"
 #include "render/cpu/screen_ball.h"
 #include "render/cpu/view_scene.h"
 #include "render/frame/billboard_textures.h"

@@ -93,15 +93,10 @@ void CpuBackend::light_all(LitCloud& cloud, StageTimes& times) { complete_light(
 bool CpuBackend::begin(const FrameDescription& frame, Picture& picture) {
     LitCloud& cloud = frame.cloud;
     ViewSortedSplats order = frame.view_sorted();
-    const bool own = order.pictures != nullptr && !order.billboards.empty();
-    if (own && texels_of_ != order.pictures->serial) {
-        texels_ = billboard_texels(*order.pictures);
-        texels_of_ = order.pictures->serial;
-    }
     std::vector<ProcessorView> views;
     for (const FramePart& part : frame.parts)
         views.emplace_back(frame.options, frame.camera, part.frame, part.area, order, BatchLimits{},
-                           &frame.times, own ? &texels_ : nullptr);
+                           &frame.times);
     std::optional<VisibleSet> seen;
     if (!frame.splats.light && !cloud.all_known) {
         seen.emplace(order, cloud.shadow_size);

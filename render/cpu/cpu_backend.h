@@ -6,7 +6,6 @@
 // picture shows it; a second picture of the same cloud computes the rest. Private to the module.
 
 #include "render/backend/backend.h"
-#include "render/cpu/billboard_texels.h"
 
 namespace nephos {
 
@@ -23,10 +22,6 @@ class CpuBackend : public Backend {
     void light_all(LitCloud& cloud, StageTimes& times) override;
     // Draws at once.
     bool begin(const FrameDescription& frame, Picture& picture) override;
-
-  private:
-    BillboardTexels texels_;       // of the pictures of billboards that were drawn last
-    std::uint64_t texels_of_ = 0;  // BillboardPictures::serial of these
 };
 
 }  // namespace nephos

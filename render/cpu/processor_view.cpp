@@ -11,7 +11,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "render/cpu/billboard_texels.h"
+#include "render/frame/billboard_textures.h"
 #include "render/cpu/screen_ball.h"
 #include "render/cpu/view_scene.h"
 #include "render/frame/screen_box.h"
@@ -78,8 +78,8 @@ void store(const TileSums& sums, const ViewTile& tile, const PicturePart& part, 
 
 ProcessorView::ProcessorView(const RenderOptions& options, const CameraFrame& camera,
                              const PictureFrame& frame, const PicturePart& part, const ViewSortedSplats& order,
-                             const BatchLimits& limits, StageTimes* times, const BillboardTexels* pictures)
-    : order_(&order), frame_(frame), part_(part), limits_(limits), times_(times), pictures_(pictures) {
+                             const BatchLimits& limits, StageTimes* times)
+    : order_(&order), frame_(frame), part_(part), limits_(limits), times_(times) {
     const StageTimer timer(times_, DrawStage::eye_bins);
     if (!order.billboards.empty()) source_ = splats_near_to_far(order);
     boxes_ = screen_boxes(order, camera, options.camera, part, source_);
@@ -147,8 +147,7 @@ ProcessorView::Batch ProcessorView::prepare_batch(std::size_t begin, std::size_t
 
 // Returns the billboards' texels; null without billboards, so that they are not generated.
 const BillboardTexels* ProcessorView::texels() const {
-    if (source_.empty()) return nullptr;
-    return pictures_ != nullptr ? pictures_ : &billboard_texels();
+    return source_.empty() ? nullptr : &billboard_texels(order_->pictures);
 }
 
 void ProcessorView::light(Batch& batch, const VisibleSet* seen) const {

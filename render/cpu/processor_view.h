@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "render/cloud/stage_times.h"
-#include "render/cpu/billboard_texels.h"
+#include "render/frame/billboard_textures.h"
 #include "render/frame/marched_scene.h"
 #include "render/cpu/screen_ball.h"
 #include "render/frame/air_shells.h"
@@ -38,11 +38,10 @@ struct VisibleSet {
 // live until the last; only the light of its metaballs may change meanwhile.
 class ProcessorView {
   public:
-    // `frame` is that of the part; `pictures`: the texels of ViewSortedSplats::pictures where there are any, which live as
-    // long as this.
+    // `frame` is that of the part.
     ProcessorView(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
                   const PicturePart& part, const ViewSortedSplats& order, const BatchLimits& limits = {},
-                  StageTimes* times = nullptr, const BillboardTexels* pictures = nullptr);
+                  StageTimes* times = nullptr);
 
     // Adds what the part shows.
     void find_visible(int shadow_size, VisibleSet& seen);
@@ -74,7 +73,6 @@ class ProcessorView {
     PicturePart part_;
     BatchLimits limits_;
     StageTimes* times_;
-    const BillboardTexels* pictures_;
     std::vector<std::uint32_t> source_;  // splats_near_to_far(); empty without billboards
     std::vector<PixelBox> boxes_;        // of the splats, nearest first
     std::vector<Batch> kept_;            // one, if find_visible() has made it

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <span>
 
-#include "render/cpu/billboard_texels.h"
+#include "render/frame/billboard_textures.h"
 #include "render/frame/marched_scene.h"
 #include "render/cpu/screen_ball.h"
 #include "render/frame/frame_data.h"

@@ -8,12 +8,13 @@
 
 #include <tbb/parallel_for.h>
 
+#include "render/frame/billboard_row.h"
 #include "render/frame/billboard_textures.h"
 
 namespace nephos {
 namespace {
 
-constexpr int kQueryLevel = 2;  // of the textures, for single places: 32 texels across
+constexpr unsigned kQueryLevel = 2;  // of the textures, for single places: 32 texels across
 constexpr int kMostCells = 256;
 constexpr int kRowsAtOnce = 16;  // of a shadow map
 
@@ -25,39 +26,6 @@ bool is_good(const CloudBillboard& of, int pictures) {
            of.height_m > 0 && std::isfinite(of.width_m) && std::isfinite(of.height_m) && of.opacity > 0 &&
            of.opacity <= 1 && std::size_t(of.texture) < std::size_t(kBillboardKinds) && of.picture < pictures;
 }
-
-// One layer of a level of the textures, as a turned billboard has it.
-struct TurnedTexture {
-    const std::uint8_t* texels;
-    int side;
-    float right_x, right_y, up_x, up_y;  // change of column and row for a step of -1..1 to the right, and up
-
-    TurnedTexture(const BillboardLevel& level, unsigned layer, unsigned turn)
-        : texels(&level.texels[std::size_t(2) * layer * std::size_t(level.side) * std::size_t(level.side)]),
-          side(level.side) {
-        const float half = 0.5f * float(side), x = (turn & 1u) != 0 ? -half : half,
-                    y = (turn & 2u) != 0 ? half : -half;
-        const bool exchanged = (turn & 4u) != 0;
-        right_x = exchanged ? 0 : x;
-        right_y = exchanged ? x : 0;
-        up_x = exchanged ? y : 0;
-        up_y = exchanged ? 0 : y;
-    }
-
-    // Opacity, 0..1, between texels; `right` and `up` from -1 to 1.
-    float opacity(float right, float up) const {
-        const float middle = 0.5f * float(side) - 0.5f, last = float(side - 1);
-        const float x = std::clamp(middle + right_x * right + up_x * up, 0.0f, last),
-                    y = std::clamp(middle + right_y * right + up_y * up, 0.0f, last);
-        const int i = std::min(int(x), side - 2), j = std::min(int(y), side - 2);
-        const float fx = x - float(i), fy = y - float(j);
-        const std::uint8_t* const at = texels + 2 * (j * side + i);
-        const std::uint8_t* const next = at + 2 * side;
-        const float above = float(at[0]) + fx * (float(at[2]) - float(at[0])),
-                    below = float(next[0]) + fx * (float(next[2]) - float(next[0]));
-        return (above + fy * (below - above)) * (1.0f / 255);
-    }
-};
 
 // Spheres that fill an ellipsoid with the level semi-axes a and the upright one b about: none reaches above or below it.
 void add_spheres(const Vec3& centre_m, double a, double b, double weight, std::vector<ShadowCaster>& to) {
@@ -176,7 +144,7 @@ float BillboardShade::sunlight_at(const Vec3& place_m, std::uint32_t but_for_clo
         cell[axis] = int(c);
     }
     const std::size_t n = std::size_t(cell[1]) * std::size_t(cells_[0]) + std::size_t(cell[0]);
-    const BillboardLevel& level = billboard_levels(pictures_.get())[kQueryLevel];
+    const BillboardTexels& texels = billboard_texels(pictures_.get());
     float left = 1;
     for (std::uint32_t i = first_[n]; i < first_[n + 1]; ++i) {
         const Caster& c = casters_[listed_[i]];
@@ -186,7 +154,7 @@ float BillboardShade::sunlight_at(const Vec3& place_m, std::uint32_t but_for_clo
         if (std::abs(right) >= 1 || std::abs(up) >= 1) continue;
         const float behind = std::clamp(0.5f + 0.5f * float(s - c.s) / c.half_chord, 0.0f, 1.0f);
         if (behind <= 0) continue;
-        left *= 1 - behind * c.opacity * TurnedTexture(level, c.layer, c.turn).opacity(right, up);
+        left *= 1 - behind * c.opacity * TurnedTexture(texels, kQueryLevel, c.layer, c.turn).opacity(right, up);
     }
     return left;
 }
@@ -213,18 +181,17 @@ BillboardShade::Footprint BillboardShade::footprint(const Caster& caster, const 
 void BillboardShade::cast_row(const Caster& caster, const Footprint& on, int row,
                               std::span<float> texels) const {
     const double texels_per_texel = kBillboardTexels / (2 * std::max(on.half_x, on.half_y));
-    std::size_t level = 0;
-    while (level + 1 < std::size_t(kBillboardLevels) && texels_per_texel > double(1 << level) * 1.4142)
-        ++level;
-    const TurnedTexture texture(billboard_levels(pictures_.get())[level], caster.layer, caster.turn);
+    unsigned level = 0;
+    while (level + 1 < unsigned{kBillboardLevels} && texels_per_texel > double(1u << level) * 1.4142) ++level;
+    const TurnedTexture texture(billboard_texels(pictures_.get()), level, caster.layer, caster.turn);
     const auto column = [&](double x) {
         return int(std::clamp(std::ceil(x - 0.5), 0.0, double(texels.size())));
     };
-    const float up = float((row + 0.5 - on.y) / on.half_y), step = float(1 / on.half_x);
     const int first = column(on.x - on.half_x), end = column(on.x + on.half_x);
-    float right = float((first + 0.5 - on.x) / on.half_x);
-    for (int i = first; i < end; ++i, right += step)
-        texels[std::size_t(i)] *= 1 - on.opacity * texture.opacity(right, up);
+    if (first >= end) return;
+    shade_row(texture, {.first = float((first + 0.5 - on.x) / on.half_x), .step = float(1 / on.half_x)},
+              float((row + 0.5 - on.y) / on.half_y), on.opacity,
+              texels.subspan(std::size_t(first), std::size_t(end - first)));
 }
 
 void BillboardShade::cast(const ShadowFrame& frame, int size, std::span<float> shadow) const {

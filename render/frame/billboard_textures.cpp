@@ -183,6 +183,34 @@ std::vector<BillboardLevel> levels_from(BillboardLevel finest, bool own) {
     return levels;
 }
 
+void append_level(const BillboardLevel& level, BillboardTexels& out) {
+    const std::size_t side = std::size_t(level.side), layers = level.texels.size() / (2 * side * side);
+    const std::size_t stride = side + 2;
+    out.first.push_back(std::uint32_t(out.texels.size()));
+    out.texels.resize(out.texels.size() + 2 * layers * stride * stride, 0);
+    std::uint32_t* to = &out.texels[out.first.back()];
+    for (std::size_t layer = 0; layer < 2 * layers; ++layer, to += stride * stride) {
+        for (std::size_t j = 0; j < side; ++j) {
+            for (std::size_t i = 0; i < side; ++i) {
+                const std::size_t row = layer < layers ? j : i, column = layer < layers ? i : j;
+                const std::uint8_t* from = &level.texels[2 * ((layer % layers * side + row) * side + column)];
+                const std::uint32_t texel = from[0] | std::uint32_t(from[1]) << 8;
+                std::uint32_t* const at = to + (j + 1) * stride + i + 1;
+                at[0] |= texel;
+                at[-1] |= texel << 16;
+            }
+        }
+    }
+}
+
+BillboardTexels texels_of(const std::vector<BillboardLevel>& levels) {
+    BillboardTexels texels;
+    const std::size_t side = std::size_t(levels.front().side);
+    texels.layers = std::uint32_t(levels.front().texels.size() / (2 * side * side));
+    for (const BillboardLevel& level : levels) append_level(level, texels);
+    return texels;
+}
+
 // Mean of an image's values over the rectangle from (left, top) to (right, bottom), pixels.
 float mean_over(const AlphaImage& image, const std::vector<float>& values, double left, double top, double right,
                 double bottom) {
@@ -241,11 +269,18 @@ std::shared_ptr<const BillboardPictures> billboard_pictures(std::size_t count,
     made->serial = ++last_serial;
     made->count = int(count);
     made->levels = billboard_textures();
-    if (count == 0) return made;
-    const std::vector<BillboardLevel> own = levels_from(std::move(finest), true);
-    for (std::size_t n = 0; n < own.size(); ++n)
-        made->levels[n].texels.insert(made->levels[n].texels.end(), own[n].texels.begin(), own[n].texels.end());
+    if (count > 0) {
+        const std::vector<BillboardLevel> own = levels_from(std::move(finest), true);
+        for (std::size_t n = 0; n < own.size(); ++n)
+            made->levels[n].texels.insert(made->levels[n].texels.end(), own[n].texels.begin(), own[n].texels.end());
+    }
+    made->texels = texels_of(made->levels);
     return made;
+}
+
+const BillboardTexels& billboard_texels(const BillboardPictures* pictures) {
+    static const BillboardTexels texels = texels_of(billboard_textures());
+    return pictures != nullptr ? pictures->texels : texels;
 }
 
 BillboardPicture billboard_picture(BillboardTexture kind, std::uint32_t variant) {

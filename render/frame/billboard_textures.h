@@ -31,17 +31,31 @@ struct BillboardLevel {
 // second. Thread-safe.
 const std::vector<BillboardLevel>& billboard_textures();
 
+// Levels in the form that the processor samples. Each layer of each level has side + 2 rows of side + 2 texels: a rim
+// without opacity around the picture. A texel has its own two bytes, opacity and opacity times brightness, in the lower
+// half and those of the next in its row in the upper half: one fetch gets both that lie beside a point. After all layers
+// of a level come the same with columns and rows exchanged.
+struct BillboardTexels {
+    std::vector<std::uint32_t> texels;
+    std::vector<std::uint32_t> first;  // of each level; a layer has (side + 2)^2
+    std::uint32_t layers = 0;          // before those with columns and rows exchanged
+};
+
 // Textures from noise, and behind their layers one for each picture of billboard_pictures().
 struct BillboardPictures {
     std::uint64_t serial = 0;  // unlike that of all others; above 0
     int count = 0;             // of pictures
     std::vector<BillboardLevel> levels;
+    BillboardTexels texels;  // of `levels`
 };
 
 // Returns the levels with the pictures, or those of billboard_textures() for null.
 inline const std::vector<BillboardLevel>& billboard_levels(const BillboardPictures* pictures) {
     return pictures != nullptr ? pictures->levels : billboard_textures();
 }
+
+// The same for the processor. Thread-safe.
+const BillboardTexels& billboard_texels(const BillboardPictures* pictures);
 
 // The texture of a billboard: a layer, and in `turn` the flags mirrored left-right (1), top-bottom (2) and
 // axes exchanged (4), applied in that order; fibres remain horizontal.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The shade of billboards: what they hide when they are looked at from the sun.
 
+#include "render/frame/billboard_row.h"
 #include "render/frame/billboard_shade.h"
 
 #include <algorithm>
@@ -38,6 +39,25 @@ CloudBillboard plate(const Vec3& centre_m, float size_m, std::uint32_t cloud = 0
     billboard.picture = 0;
     billboard.cloud = cloud;
     return billboard;
+}
+
+// All turns and levels; rows of any length, which begin and end beyond the rim.
+TEST(BillboardShade, RowsAreTheirPlaces) {
+    for (const unsigned turn : {0u, 1u, 2u, 3u, 4u, 5u, 6u, 7u}) {
+        for (unsigned level = 0; level < unsigned{kBillboardLevels}; ++level) {
+            const TurnedTexture texture(billboard_texels(nullptr), level, 3 + turn % 4, turn);
+            const int count = 5 + int(13 * turn + level);
+            const PlacesInRow places{.first = -1.04f, .step = 2.1f / float(count)};
+            const float up = -0.9f + 0.23f * float(turn);
+            std::vector<float> light(static_cast<std::size_t>(count), 0.5f);
+            shade_row(texture, places, up, 0.8f, light);
+            for (int i = 0; i < count; ++i) {
+                const float right = places.first + float(i) * places.step;
+                ASSERT_NEAR(light[std::size_t(i)], 0.5f * (1 - 0.8f * texture.opacity(right, up)), 2e-5f)
+                    << "turn " << turn << ", level " << level << ", place " << i;
+            }
+        }
+    }
 }
 
 // Bytes of a picture hold opacities in steps of 1/255.
