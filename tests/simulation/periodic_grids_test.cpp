@@ -75,7 +75,7 @@ TEST_F(PeriodicGrids, AreSaturatedUpToTheirSides) {
 
 TEST_F(PeriodicGrids, OfLayersAreSaturatedUpToTheSidesOfEach) {
     for (const int refine : {1, 2}) {
-        const DensityGrid grid = written(std::string(kOvercast) + kLayers, refine);
+        const DensityGrid grid = written(std::string(kOvercast).append(kLayers), refine);
         ASSERT_EQ(grid.extent(), (Extent{16 * refine, 16 * refine, 28 * refine}));
         for (int k = 0; k < grid.extent().z; ++k) {
             const int cell = k / refine;
