@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/netcdf_file.h"
 
-#include <algorithm>
+#include <bit>
 #include <cstring>
 
 #include <fmt/format.h>
@@ -15,11 +15,18 @@ namespace {
 constexpr std::uint32_t kDimensionTag = 10, kVariableTag = 11, kAttributeTag = 12;
 constexpr std::uint64_t kLargestVariable = 0xfffffffc;
 
+// Big-endian.
 template <typename T>
 void put(std::string& out, T value) {
+    static_assert(sizeof(T) == 4 || sizeof(T) == 8);
     char bytes[sizeof(T)];
-    std::memcpy(bytes, &value, sizeof(T));
-    std::reverse(std::begin(bytes), std::end(bytes));  // big-endian
+    if constexpr (sizeof(T) == 4) {
+        const std::uint32_t swapped = __builtin_bswap32(std::bit_cast<std::uint32_t>(value));
+        std::memcpy(bytes, &swapped, sizeof(T));
+    } else {
+        const std::uint64_t swapped = __builtin_bswap64(std::bit_cast<std::uint64_t>(value));
+        std::memcpy(bytes, &swapped, sizeof(T));
+    }
     out.append(bytes, sizeof(T));
 }
 

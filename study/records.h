@@ -12,10 +12,10 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "study/run_statistics.h"
@@ -59,7 +59,7 @@ class Records {
     // when it cannot be opened.
     std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path);
 
-    std::map<std::string, RunRecord, std::less<>> runs_;
+    std::unordered_map<std::string, RunRecord> runs_;
     std::vector<std::string> problems_;
     std::vector<std::filesystem::path> files_;  // of series, by RunRecord::shard
 };

@@ -146,7 +146,7 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
     require_place_for(plan, *guard, job.folder);
     if (job.overwrite) remove_shards(job.folder, job.shard, job.shards);
     // Whoever overwrites does not ask what other shards have done: they may be of another version.
-    const Records records = job.overwrite ? Records() : Records::read({job.folder});
+    Records records = job.overwrite ? Records() : Records::read({job.folder});
     SweepReport report = status_of(plan, job, records);
     SweepProgress& count = report.progress;
     const auto is_wanted = [&](const PlannedRun& run) {
@@ -164,7 +164,10 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
     if (count.done < count.in_all) opened.emplace(job.folder, job.shard, job.shards);
     place_plan(plan, job.folder);
     guard.reset();
-    if (!opened) return report;
+    if (!opened) {
+        if (!job.overwrite) report.records = std::move(records);
+        return report;
+    }
     Shard& shard = *opened;
     std::uint64_t at = 0;
     bool give_up = false;

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,7 @@ struct SweepReport {
     double wall_s = 0;
     std::vector<std::string> failures;  // "point 3, replicate 1: message", at most five
     std::vector<std::string> problems;  // of shards that could not be read as a whole (Records::problems)
+    std::optional<Records> records;     // of the folder, where run_sweep() had nothing to run and added none
 };
 
 // Writes the plan and the scene, as run_sweep() does, and runs nothing. Throws Error(io), also when the folder has another plan

@@ -173,6 +173,28 @@ void remove_table(const std::filesystem::path& path) {
     if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
 }
 
+// The series of the runs of a table, which is written one series of all runs after the other: those that fit into so much
+// memory are unpacked once, the others for each series anew.
+class UnpackedSeries {
+  public:
+    UnpackedSeries(const Records& records, std::size_t runs) : records_(records), kept_(runs) {}
+    // What is returned lives until the next call.
+    const std::vector<float>& of(std::size_t run, const RunRecord& record) {
+        if (!kept_[run].empty()) return kept_[run];
+        std::vector<float> values = records_.series(record);
+        const std::size_t bytes = values.size() * sizeof(float);
+        if (bytes > left_) return current_ = std::move(values);
+        left_ -= bytes;
+        return kept_[run] = std::move(values);
+    }
+
+  private:
+    const Records& records_;
+    std::vector<std::vector<float>> kept_;
+    std::size_t left_ = std::size_t(128) << 20;
+    std::vector<float> current_;
+};
+
 void write_series(const SweepPlan& plan, const Records& records, const std::filesystem::path& path) {
     std::vector<DoneRun> done;
     std::uint64_t steps = 0;
@@ -268,14 +290,16 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
                                                                     : kNaN);
                                      }
                                  }));
+    UnpackedSeries unpacked(records, done.size());
     for (std::size_t s = 0; s < kSeries.size(); ++s) {
         variables.push_back(
             variable(std::string(kSeries[s].name), NetcdfType::float32, {0, 1},
                      described(kSeries[s].unit, kSeries[s].definition, kSeries[s].standard_name),
                      [&, s](const Put& put) {
-                         for (const DoneRun& one : done) {
-                             const std::vector<float> values = records.series(*one.record);
-                             const std::uint64_t count = one.record->result.steps + 1;
+                         for (std::size_t run = 0; run < done.size(); ++run) {
+                             const RunRecord& record = *done[run].record;
+                             const std::vector<float>& values = unpacked.of(run, record);
+                             const std::uint64_t count = record.result.steps + 1;
                              for (std::uint64_t n = 0; n <= steps; ++n)
                                  put(n < count ? double(values[s * count + n]) : kNaN);
                          }

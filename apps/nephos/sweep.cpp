@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "study/sweep_file.h"
 #include "study/tables.h"
@@ -221,7 +222,7 @@ int sweep(const SweepArguments& a) {
     if (!a.work.quiet && !a.work.json) print_note(describe(plan));
     std::unique_ptr<ProgressBar> bar;
     defer_signals();
-    const SweepReport report = run_sweep(
+    SweepReport report = run_sweep(
         plan, job,
         [&](const SweepProgress& progress) {
             if (!bar)
@@ -247,7 +248,8 @@ int sweep(const SweepArguments& a) {
         if (!is_plan_of(plan, job.folder))
             throw Error(ErrorCode::io,
                         folder + ": another plan took the place of this one: no tables are written");
-        write_and_print_tables(plan, Records::read({job.folder}), folder, quiet);
+        const Records records = report.records ? std::move(*report.records) : Records::read({job.folder});
+        write_and_print_tables(plan, records, folder, quiet);
     } else if (!quiet) {
         output.line(fmt::format("shard {} of {} is done; when all are, `nephos merge {}` makes the tables",
                                 job.shard, job.shards, folder));

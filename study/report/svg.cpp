@@ -14,6 +14,7 @@ namespace nephos::report {
 namespace {
 
 constexpr int kTickDigits = 4;
+constexpr int kNameWidth = 7;  // of a letter of a legend, at most
 
 // Returns the step of round numbers, 1, 2 or 5 times a power of ten, that cuts a range into at most `count` parts.
 double round_step(double range, int count) {
@@ -203,6 +204,11 @@ void Figure::shade(double from, double to, std::string_view title) {
 }
 
 void Figure::legend(std::span<const std::pair<std::string, std::string>> colours_and_names) {
+    std::size_t longest = 0;
+    for (const auto& [colour, name] : colours_and_names) longest = std::max(longest, name.size());
+    const int wide = 30 + int(longest) * kNameWidth;
+    over_ += fmt::format("<rect class=\"behind\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n",
+                         width_ - kRight - wide, kTop + 1, wide, 13 * colours_and_names.size() + 4);
     int y = kTop + 13;
     for (const auto& [colour, name] : colours_and_names) {
         over_ += fmt::format(

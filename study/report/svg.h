@@ -68,7 +68,7 @@ class Figure {
     PlotAxis x_, y_;
     int width_, height_;
     std::string content_, over_;
-    static constexpr int kLeft = 58, kRight = 14, kTop = 12, kBottom = 42;
+    static constexpr int kLeft = 68, kRight = 14, kTop = 12, kBottom = 42;
 };
 
 }  // namespace nephos::report
