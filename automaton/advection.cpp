@@ -10,47 +10,38 @@
 namespace nephos {
 namespace {
 
-// A row with what flows in from either side, so that a shift becomes a copy of bits from `start` on: zeros,
-// the row and zeros again, or, if periodic, the row twice.
-class RowWithSurroundings {
+// A periodic row whose end is within a word, twice: a shift becomes a copy of bits from `start` on.
+class RepeatedRow {
   public:
-    RowWithSurroundings(std::int64_t nx, std::size_t words, bool periodic, std::int64_t dx)
-        : nx_(nx), words_(words), periodic_(periodic), bits_(3 * words + 1, 0) {
-        const std::int64_t all = std::int64_t(words) * 64;
-        start_ = std::size_t(periodic ? nx - dx : all - std::clamp(dx, -all, all));
-    }
+    RepeatedRow(std::int64_t nx, std::size_t words) : nx_(nx), bits_(2 * words + 1, 0) {}
 
-    void load(const std::uint64_t* row) {
-        if (!periodic_) {
-            std::copy_n(row, words_, bits_.data() + words_);
-            return;
-        }
+    void load(std::span<const std::uint64_t> row) {
         const std::size_t end = std::size_t(nx_ / 64);
         const int rest = int(nx_ % 64);
-        std::copy_n(row, words_, bits_.data());
-        if (rest == 0) {
-            std::copy_n(row, words_, bits_.data() + end);
-            return;
-        }
-        for (std::size_t w = 0; w < words_; ++w) {
+        std::ranges::copy(row, bits_.begin());
+        for (std::size_t w = 0; w < row.size(); ++w) {
             bits_[end + w] |= row[w] << rest;
             bits_[end + w + 1] = row[w] >> (64 - rest);
         }
     }
-
-    void store_shifted(std::span<std::uint64_t> out) const {
-        const std::uint64_t* in = bits_.data() + start_ / 64;
-        const int shift = int(start_ % 64);
-        for (std::size_t w = 0; w < out.size(); ++w) out[w] = in[w] >> shift | in[w + 1] << 1 << (63 - shift);
-    }
+    std::uint64_t operator()(std::size_t word) const { return bits_[word]; }
 
   private:
     std::int64_t nx_;
-    std::size_t words_;
-    bool periodic_;
-    std::size_t start_;
     std::vector<std::uint64_t> bits_;
 };
+
+// Writes the bits from `start` on of the words that `word_at` returns.
+template <class WordAt>
+void store_shifted_words(std::span<std::uint64_t> out, std::size_t start, const WordAt& word_at) {
+    const int shift = int(start % 64);
+    std::uint64_t word = word_at(start / 64);
+    for (std::size_t w = 0; w < out.size(); ++w) {
+        const std::uint64_t next = word_at(start / 64 + w + 1);
+        out[w] = word >> shift | next << 1 << (63 - shift);
+        word = next;
+    }
+}
 
 std::int64_t wrap(std::int64_t value, std::int64_t size) { return (value % size + size) % size; }
 
@@ -76,16 +67,31 @@ void shift_layer(BitPlane& plane, int k, std::int64_t dx, std::int64_t dy, const
     if (std::ranges::all_of(layer, [](std::uint64_t word) { return word == 0; })) return;
     scratch.assign(layer.begin(), layer.end());
     const std::uint64_t last_word = nx % 64 == 0 ? ~std::uint64_t{0} : (std::uint64_t{1} << (nx % 64)) - 1;
-    RowWithSurroundings row(nx, words, wraps_x, dx);
-    for (std::int64_t j = 0; j < ny; ++j) {
+    const bool whole_words = nx % 64 == 0;
+    RepeatedRow repeated(nx, wraps_x && !whole_words ? words : 0);
+    // Of a row repeated, or of one with as many words of zeros on either side.
+    const std::int64_t all = std::int64_t(words) * 64;
+    const std::size_t start = std::size_t(wraps_x ? (nx - dx) % nx : all - std::clamp(dx, -all, all));
+    std::int64_t from = wraps_y && dy > 0 ? ny - dy : -dy;
+    for (std::int64_t j = 0; j < ny; ++j, ++from) {
         const std::span out = layer.subspan(std::size_t(j) * words, words);
-        const std::int64_t from = wraps_y ? wrap(j - dy, ny) : j - dy;
-        if (from < 0 || from >= ny) {
-            std::ranges::fill(out, std::uint64_t{0});
+        if (wraps_y && from == ny) from = 0;
+        const bool inside = from >= 0 && from < ny;
+        const std::span<const std::uint64_t> in(scratch.data() + (inside ? std::size_t(from) * words : 0), words);
+        std::uint64_t any = 0;
+        for (const std::uint64_t word : in) any |= word;
+        if (!inside || any == 0) {
+            for (std::uint64_t& word : out) word = 0;
             continue;
         }
-        row.load(scratch.data() + std::size_t(from) * words);
-        row.store_shifted(out);
+        if (!wraps_x) {
+            store_shifted_words(out, start, [&](std::size_t w) { return w - words < words ? in[w - words] : 0; });
+        } else if (whole_words) {
+            store_shifted_words(out, start, [&](std::size_t w) { return in[w < words ? w : w - words]; });
+        } else {
+            repeated.load(in);
+            store_shifted_words(out, start, repeated);
+        }
         out.back() &= last_word;
     }
 }
