@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <memory>
 #include <span>
 
@@ -55,6 +54,7 @@ inline void find_cloudy(const Segment& g, std::uint64_t* any) {
 inline void draw_segment(const Segment& g, BirthScratch& s) {
     const BlockField& field = *g.random.field;
     s.known_cloud = 0;
+    s.known_philox = 0;
     if (field.any_extinction()) find_cloudy(g, s.cloudy);
     std::uint64_t counters[kSegmentBlocks + kMaxLanes64];
     for (int b = 0; b < kSegmentBlocks + kMaxLanes64; ++b) counters[b] = g.counter(Draw::counts, b, 0);
@@ -62,6 +62,7 @@ inline void draw_segment(const Segment& g, BirthScratch& s) {
 
     field.plan_blocks(g.bx0, g.by, g.bz, s.row, std::span(s.plans).first(std::size_t(g.blocks)));
     bound_rates(g, s);
+    std::size_t dense[3] = {};
     for (int b = 0; b < g.blocks; ++b) {
         const BlockPlan& plan = s.plans[std::size_t(b)];
         unsigned sparse = 0;
@@ -72,14 +73,13 @@ inline void draw_segment(const Segment& g, BirthScratch& s) {
             if (is_sparse(draw_plan)) {
                 sparse |= 1u << draw;
             } else {
-                run_dense(g, b, draw, plan, s);
+                s.dense_blocks[draw][dense[draw]++] = std::uint8_t(b);
             }
         }
         if (sparse != 0) queue_sparse(g, b, sparse, s);
     }
     run_queue(g, s);
-    run_ties(g, s);
-    apply_dense_events(g, s);
+    for (int draw = 0; draw < 3; ++draw) run_dense(g, draw, std::span(s.dense_blocks[draw]).first(dense[draw]), s);
 }
 
 // Finds the rows of cells of a row of blocks in the planes.
@@ -100,12 +100,7 @@ inline void find_rows(const StepPlanes& planes, int by, int bz, Segment& segment
 
 // Removes what a part left that ended with an exception in the midst of a segment: other parts would run it.
 inline void empty_queues(BirthScratch& s) {
-    s.accepted_count = s.job_count = s.counter_count = s.tie_count = 0;
-    for (std::size_t draw = 0; draw < 3; ++draw) {
-        if (s.dense_words[draw] == 0) continue;
-        std::memset(s.dense_events[draw], 0, sizeof s.dense_events[draw]);
-        s.dense_words[draw] = 0;
-    }
+    s.accepted_count = s.job_count = s.counter_count = 0;
 }
 
 // Returns the memory of this thread, for any number of parts: a part of a small lattice takes less time than making it.

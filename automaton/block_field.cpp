@@ -181,10 +181,11 @@ void BlockField::plan_blocks(int bx0, int by, int bz, std::span<const FieldEllip
             if (end - bx < EllipsoidInRow::kBlocks) touched &= (1u << (end - bx)) - 1;
             for (; touched != 0; touched &= touched - 1) {
                 const auto n = std::size_t(std::countr_zero(touched));
-                seen.base_a = in_row.base_a[n];
-                seen.base_b = in_row.base_b[n];
                 BlockPlan& plan = plans[std::size_t(bx - bx0) + n];
-                plan.ellipsoids.push_back(seen);
+                // Set in the copy: a copy of what has just been set, by wider loads, would wait for it to reach the cache.
+                BlockEllipsoid& in_block = plan.ellipsoids.emplace_back(seen);
+                in_block.base_a = in_row.base_a[n];
+                in_block.base_b = in_row.base_b[n];
                 for (std::size_t d = 0; d < 3; ++d)
                     widen(d, in_row.bound[d][n], (in_row.covered >> n & 1) != 0, plan);
             }

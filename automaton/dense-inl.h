@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The dense draw (docs/adr/0002): compares one random byte a cell with the top byte of its p; ties, 1 in 256,
-// compare 24 bits more at the end of the segment. Layers of a block that the draw cannot change are skipped.
+// compare 24 bits more. A draw is made for all blocks of a segment that it is dense in: Philox runs through a list of quarters of
+// blocks (PhiloxJob), 8 sub-indices or 128 cells each, whose words are compared where they lie, in their order
+// (BitOrder::words). Quarters that extinction finds no cloud in are left out.
 
 #if defined(NEPHOS_DENSE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_DENSE_INL_H_
@@ -14,7 +16,6 @@
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <vector>
 
@@ -22,16 +23,12 @@
 
 #include "automaton/block_bits-inl.h"
 #include "automaton/segment-inl.h"
+#include "automaton/ties-inl.h"
+#include "automaton/undecided-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-// Thresholds of the 64 cells of a layer of a block, x fastest, and their top bytes.
-struct LayerThresholds {
-    alignas(64) std::array<std::uint32_t, 64> full;
-    alignas(64) std::array<std::uint8_t, 64> top;
-};
 
 // Computes a*a + b*b (block_field.h) of the 64 columns of a block, x fastest, for each of its ellipsoids.
 inline void locate_columns(const BlockPlan& plan, std::vector<float>& columns) {
@@ -68,13 +65,12 @@ inline void find_in_layer(const BlockPlan& plan, int draw, int layer, BirthScrat
     }
 }
 
-// Computes the thresholds of a layer; skips vectors without a bit in `requested`.
-inline void make_thresholds(const BlockPlan& plan, int draw, int layer, std::uint64_t requested,
-                            const std::vector<LayerEllipsoid>& ellipsoids, LayerThresholds& out) {
+// Calls store(c, thresholds) with those of the cells c, c + 1, ... of a layer, 32 bits each; leaves vectors out that have no bit
+// in `requested`.
+template <class Store>
+HWY_INLINE void make_thresholds(const BlockPlan& plan, int draw, int layer, std::uint64_t requested,
+                                const std::vector<LayerEllipsoid>& ellipsoids, const Store& store) {
     const hn::CappedTag<float, 16> d;
-    const hn::RebindToSigned<decltype(d)> di;
-    const hn::RebindToUnsigned<decltype(d)> du;
-    const hn::Rebind<std::uint8_t, decltype(d)> d8;
     constexpr std::size_t kLanes = hn::MaxLanes(d);
     const auto one = hn::Set(d, 1.0f);
     const float* const values = plan.background.values[std::size_t(draw)];
@@ -89,167 +85,143 @@ inline void make_thresholds(const BlockPlan& plan, int draw, int layer, std::uin
             const auto combined = draw == kExt ? hn::Min(p, value) : hn::Max(p, value);
             p = e.bounded ? hn::IfThenElse(hn::Lt(u2, one), combined, p) : combined;
         }
-        // probability_threshold() of kernels.h
-        const auto scaled = hn::ConvertTo(di, hn::Mul(p, hn::Set(d, 0x1p31f)));
-        const auto certain = hn::RebindMask(du, hn::Ge(p, one));
-        const auto threshold =
-            hn::IfThenElse(certain, hn::Set(du, kCertain), hn::ShiftLeft<1>(hn::BitCast(du, scaled)));
-        hn::Store(threshold, du, out.full.data() + c);
-        hn::StoreU(hn::DemoteTo(d8, hn::BitCast(di, hn::ShiftRight<24>(threshold))), d8, out.top.data() + c);
+        store(c, threshold_of(d, p));
     }
 }
 
-// One bit for each of 64 cells: random byte less than, or equal to, that of `top(cell)`.
-struct LayerBits {
-    std::uint64_t less = 0, tie = 0;
+// Top bytes of the thresholds of a quarter, in the order of its words: 64 for words 0 and 1, 64 for words 2 and 3.
+struct JobThresholds {
+    alignas(64) std::array<std::uint64_t, 8> words01{}, words23{};
 };
 
-template <class Top>
-HWY_INLINE LayerBits compare_bytes(const std::uint8_t* random, const Top& top) {
-    LayerBits bits;
-#if HWY_TARGET == HWY_SCALAR  // one lane does not fill a byte of mask bits
-    const hn::ScalableTag<std::uint8_t> d;
-    for (std::size_t c = 0; c < 64; ++c) {
-        const std::uint8_t threshold = hn::GetLane(top(d, c));
-        bits.less |= std::uint64_t{random[c] < threshold} << c;
-        bits.tie |= std::uint64_t{random[c] == threshold} << c;
-    }
-#elif HWY_TARGET <= HWY_AVX3
-    const hn::CappedTag<std::uint8_t, 64> d;
-    const auto value = hn::LoadU(d, random), threshold = top(d, 0);
-    bits.less = hn::Lt(value, threshold).raw;
-    bits.tie = hn::Eq(value, threshold).raw;
-#else
-    const hn::CappedTag<std::uint8_t, 64> d;
-    HWY_ALIGN std::uint8_t less[16], tie[16];  // StoreMaskBits may write 8 bytes from where it starts
-    for (std::size_t c = 0; c < 64; c += hn::Lanes(d)) {
-        const auto value = hn::LoadU(d, random + c), threshold = top(d, c);
-        hn::StoreMaskBits(d, hn::Lt(value, threshold), less + c / 8);
-        hn::StoreMaskBits(d, hn::Eq(value, threshold), tie + c / 8);
-    }
-    std::memcpy(&bits.less, less, 8);
-    std::memcpy(&bits.tie, tie, 8);
-#endif
-    return bits;
-}
-
-// Decides the queued ties by 24 more random bits. Cell c takes word c % 4 of counter 32 + c / 4.
-inline void run_ties(const Segment& g, BirthScratch& s) {
-    constexpr int kBatch = 64;
-    HWY_ALIGN std::uint64_t counters[kBatch + kMaxLanes64] = {};
-    HWY_ALIGN std::uint32_t words[4 * (kBatch + kMaxLanes64)];
-    Tie ties[kBatch];
-    int count = 0;
-    const auto decide = [&]() HWY_ATTR {
-        philox_counters(g.batch(), counters, count, words);
-        for (int n = 0; n < count; ++n) {
-            const Tie& tie = ties[n];
-            const std::uint64_t event = words[4 * std::uint32_t(n) + tie.cell % 4] >> 8 < tie.below;
-            s.dense_events[tie.draw][tie.block][tie.cell / 64] |= event << (tie.cell % 64);
-        }
-        count = 0;
-    };
-    for (int i = 0; i < s.tie_count; ++i) {
-        const LayerTies& layer = s.ties[i];
-        for (std::uint64_t cells = layer.cells; cells != 0; cells &= cells - 1) {
-            const std::uint32_t cell = 64 * layer.layer + std::uint32_t(std::countr_zero(cells));
-            counters[count] = g.counter(draw_of(layer.draw), layer.block, 32 + cell / 4);
-            ties[count++] = {layer.block, layer.draw, cell, layer.below};
-            if (count == kBatch) decide();
-        }
-    }
-    decide();
-    s.tie_count = 0;
-}
-
-// Returns the threshold of the 24 further bits of a tied cell.
-inline std::uint32_t tie_threshold(std::uint32_t t) { return t == kCertain ? 0x1000000u : t & 0xFFFFFFu; }
-
-// Queues the tied cells of a layer that share a threshold. Branchless: about half of all layers have one.
-HWY_INLINE LayerTies* queue_ties(LayerTies* to, int block, int draw, int layer, std::uint64_t cells,
-                                 std::uint32_t below) {
-    *to = {cells, below, std::uint8_t(block), std::uint8_t(draw), std::uint8_t(layer)};
-    return to + int{cells != 0};
-}
-
-// Generates the random bytes of the layers in `layers` (a bit each): 4 counters a layer, 16 bytes a counter.
-inline void random_bytes(const Segment& g, int block, int draw, unsigned layers, BirthScratch& s,
-                         std::uint32_t* out) {
-    const std::uint64_t first = g.counter(draw_of(draw), block, 0);
-    if (layers == 0xFF) {
-        std::optional<PhiloxTable<32>>& table = s.dense_tables[draw];
-        if (!table) table.emplace(g.batch(), std::uint32_t(draw_of(draw)));
-        philox_counters(g.batch(), *table, PhiloxBlock(g.batch(), std::uint32_t(first >> 32)), 32, out);
-        return;
-    }
-    HWY_ALIGN std::uint64_t counters[32 + kMaxLanes64] = {};
-    int count = 0;
-    for (; layers != 0; layers &= layers - 1) {
-        const auto sub = std::uint64_t(4 * std::countr_zero(layers));
-        for (std::uint64_t i = 0; i < 4; ++i) counters[count++] = first + sub + i;
-    }
-    philox_counters(g.batch(), counters, count, out);
-}
-
-// Compares the random bytes of the layers in `layers` (a bit each) with one threshold.
-inline void compare_uniform(const Segment& g, int block, int draw, std::uint32_t threshold,
-                            const CellBits& requested, unsigned layers, const std::uint8_t* bytes,
-                            BirthScratch& s) {
-    if (s.tie_count + 8 > kMaxTies) run_ties(g, s);
-    const std::uint32_t below = tie_threshold(threshold);
-    const auto top = [threshold](auto d, std::size_t)
-                         HWY_ATTR { return hn::Set(d, std::uint8_t(threshold >> 24)); };
-    CellBits& events = s.dense_events[draw][block];
-    LayerTies* ties = s.ties + s.tie_count;
-    for (; layers != 0; layers &= layers - 1, bytes += 64) {
-        const int layer = std::countr_zero(layers);
-        const LayerBits bits = compare_bytes(bytes, top);
-        ties = queue_ties(ties, block, draw, layer, bits.tie & requested[layer], below);
-        events[layer] = bits.less & requested[layer];
-    }
-    s.tie_count = int(ties - s.ties);
-}
-
-inline void run_dense(const Segment& g, int block, int draw, const BlockPlan& plan, BirthScratch& s) {
-    s.dense_words[draw] |= 1u << (block / 8);
-    CellBits& events = s.dense_events[draw][block];
-    CellBits requested;
-    if (draw == kExt) {
-        std::memcpy(requested, cloud_of_block(g, block, s), sizeof requested);
-    } else {
-        std::fill_n(requested, 8, ~std::uint64_t{0});
-    }
-    const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
-    if (draw_plan.kind == DrawPlan::Kind::certain) {
-        std::memcpy(events, requested, sizeof requested);
-        return;
-    }
-    unsigned layers = 0;
-    for (int layer = 0; layer < 8; ++layer) layers |= unsigned{requested[layer] != 0} << layer;
-    HWY_ALIGN std::uint32_t random[4 * (32 + kMaxLanes64)];
-    random_bytes(g, block, draw, layers, s, random);
-    const auto* bytes = reinterpret_cast<const std::uint8_t*>(random);
-    if (draw_plan.kind == DrawPlan::Kind::uniform) {
-        compare_uniform(g, block, draw, probability_threshold(draw_plan.p_max), requested, layers, bytes, s);
-        return;
-    }
-    locate_columns(plan, s.columns);
-    LayerThresholds t{};
-    for (; layers != 0; layers &= layers - 1, bytes += 64) {
-        const int layer = std::countr_zero(layers);
-        if (s.tie_count + 64 > kMaxTies) run_ties(g, s);
+// Computes them for the layers 2 job.quarter and 2 job.quarter + 1 of its block, of which `requested` has the cells that matter.
+inline void top_bytes(const BlockPlan& plan, int draw, const PhiloxJob& job, const CellBits& requested,
+                      BirthScratch& s, JobThresholds& out) {
+    const hn::CappedTag<std::int32_t, 16> di;
+    const hn::Rebind<std::uint8_t, decltype(di)> d8;
+    alignas(64) std::array<std::uint64_t, 16> rows{};  // of 8 cells each, in the order of the block
+    for (int n = 0; n < 2; ++n) {
+        const int layer = 2 * job.quarter + n;
         find_in_layer(plan, draw, layer, s);
-        make_thresholds(plan, draw, layer, requested[layer], s.layer, t);
-        const LayerBits bits = compare_bytes(
-            bytes, [&t](auto d, std::size_t c) HWY_ATTR { return hn::LoadU(d, t.top.data() + c); });
-        LayerTies* ties = s.ties + s.tie_count;
-        for (std::uint64_t cells = bits.tie & requested[layer]; cells != 0; cells &= cells - 1) {
-            const std::uint32_t full = t.full[std::size_t(std::countr_zero(cells))];
-            ties = queue_ties(ties, block, draw, layer, cells & (~cells + 1), tie_threshold(full));
-        }
-        s.tie_count = int(ties - s.ties);
-        events[layer] = bits.less & requested[layer];
+        auto* const bytes = reinterpret_cast<std::uint8_t*>(rows.data() + 8 * n);
+        make_thresholds(plan, draw, layer, requested[layer], s.layer, [&](std::size_t c, auto threshold) HWY_ATTR {
+            hn::StoreU(hn::DemoteTo(d8, hn::BitCast(di, hn::ShiftRight<24>(threshold))), d8, bytes + c);
+        });
     }
+    for (std::size_t i = 0; i < 8; ++i) {
+        out.words01[i] = rows[2 * i];
+        out.words23[i] = rows[2 * i + 1];
+    }
+}
+
+// Compares the random bytes of the jobs with top(n, word), 8 bytes for each of 8 rows, into s.events and s.ties.
+template <class Top>
+HWY_INLINE void compare_jobs(const Segment& g, int draw, std::span<const PhiloxJob> jobs, const Top& top,
+                             BirthScratch& s) {
+    const hn::CappedTag<std::uint64_t, 8> d;
+    philox_jobs(g.batch(), dense_table(g, draw, s), s.philox_blocks, jobs.data(), int(jobs.size()),
+                [&](int n, int i, auto words01, auto words23) HWY_ATTR {
+                    const PhiloxJob job = jobs[std::size_t(n)];
+                    const ByteBits first = compare_bytes(d, words01, top(d, n, 0, i)),
+                                   second = compare_bytes(d, words23, top(d, n, 1, i));
+                    std::uint64_t* const events = s.events[0][job.block] + 2 * job.quarter;
+                    std::uint64_t* const ties = s.ties[job.block] + 2 * job.quarter;
+                    const int shift = 8 * i;
+                    events[0] = shift == 0 ? first.less : events[0] | first.less << shift;
+                    events[1] = shift == 0 ? second.less : events[1] | second.less << shift;
+                    ties[0] = shift == 0 ? first.tie : ties[0] | first.tie << shift;
+                    ties[1] = shift == 0 ? second.tie : ties[1] | second.tie << shift;
+                });
+}
+
+// Compares in the blocks where p is the same in all cells.
+inline void compare_uniform(const Segment& g, int draw, int count, BirthScratch& s) {
+    if (count == 0) return;
+    fill_up(s.uniform_jobs, count);
+    compare_jobs(
+        g, draw, std::span(s.uniform_jobs).first(std::size_t(count)),
+        [&](auto d, int n, int, int) HWY_ATTR { return hn::Set(d, s.tops[s.uniform_jobs[n].block]); }, s);
+}
+
+// Compares in the blocks where p varies: a few jobs at a time, whose thresholds are computed first.
+inline void compare_varying(const Segment& g, int draw, int count, BirthScratch& s) {
+    constexpr int kAtATime = 4;
+    alignas(64) CellBits all;
+    fill_bits(&all, 1, ~std::uint64_t{0});
+    JobThresholds thresholds[kAtATime];
+    int located = -1;
+    fill_up(s.varying_jobs, count);
+    for (int first = 0; first < count; first += kAtATime) {
+        const int some = std::min(kAtATime, count - first);
+        for (int n = 0; n < some; ++n) {
+            const PhiloxJob job = s.varying_jobs[first + n];
+            const BlockPlan& plan = s.plans[job.block];
+            if (job.block != located) locate_columns(plan, s.columns);
+            located = job.block;
+            top_bytes(plan, draw, job, draw == kExt ? cloud_of_block(g, job.block, s) : all, s, thresholds[n]);
+        }
+        for (int n = some; n < kAtATime; ++n) thresholds[n] = thresholds[some - 1];
+        compare_jobs(
+            g, draw, std::span(s.varying_jobs + first, std::size_t(some)),
+            [&](auto d, int n, int word, int i) HWY_ATTR {
+                return hn::LoadU(d, (word == 0 ? thresholds[n].words01 : thresholds[n].words23).data() + i);
+            },
+            s);
+    }
+}
+
+// Appends the quarters of a block, those with any `cloud` unless that is null.
+inline void add_jobs(std::uint8_t block, const std::uint64_t* cloud, PhiloxJob* jobs, int& count) {
+    for (int quarter = 0; quarter < 4; ++quarter) {
+        jobs[count] = {block, std::uint8_t(quarter)};
+        count += int{cloud == nullptr || (cloud[2 * quarter] | cloud[2 * quarter + 1]) != 0};
+    }
+}
+
+inline int count_bits(const std::uint64_t* words) {
+    int count = 0;
+    for (int word = 0; word < 8; ++word) count += std::popcount(words[word]);
+    return count;
+}
+
+// Makes a draw in the blocks in `blocks`, dense in each, and applies it.
+inline void run_dense(const Segment& g, int draw, std::span<const std::uint8_t> blocks, BirthScratch& s) {
+    if (blocks.empty()) return;
+    fill_bits(s.events[0], kSegmentBlocks, 0);
+    int uniform = 0, varying = 0, undecided = 0;
+    for (const std::uint8_t block : blocks) {
+        fill_bits(s.ties + block, 1, 0);
+        const BlockPlan& plan = s.plans[block];
+        const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
+        if (draw_plan.kind == DrawPlan::Kind::certain) {
+            fill_bits(s.events[0] + block, 1, ~std::uint64_t{0});
+            continue;
+        }
+        if ((s.known_philox >> block & 1) == 0) s.philox_blocks[block] = PhiloxBlock(g.batch(), g.block_word(block));
+        s.known_philox |= std::uint64_t{1} << block;
+        const std::uint64_t* const cloud = draw == kExt ? cloud_of_block(g, block, s) : nullptr;
+        constexpr std::uint64_t kEachByte = 0x0101010101010101u;
+        if (draw_plan.kind == DrawPlan::Kind::uniform) {
+            const std::uint32_t threshold = probability_threshold(draw_plan.p_max);
+            s.tops[block] = (threshold >> 24) * kEachByte;
+            s.tie_thresholds[block] = tie_threshold(threshold);
+            add_jobs(block, cloud, s.uniform_jobs, uniform);
+            continue;
+        }
+        const TopBounds bounds = top_bounds(plan, draw);
+        if (few_undecided(cloud == nullptr ? kBlockCells : count_bits(cloud), bounds)) {
+            s.tops[block] = bounds.low * kEachByte;
+            s.high_tops[block] = bounds.high * kEachByte;
+            add_jobs(block, cloud, s.undecided_jobs, undecided);
+        } else {
+            add_jobs(block, cloud, s.varying_jobs, varying);
+        }
+    }
+    compare_uniform(g, draw, uniform, s);
+    compare_varying(g, draw, varying, s);
+    run_undecided(g, draw, undecided, s);
+    run_ties(g, draw, blocks, s);
+    apply_bits(g, draw, s.events[0], BitOrder::words);
 }
 
 }  // namespace nephos::HWY_NAMESPACE

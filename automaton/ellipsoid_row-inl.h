@@ -25,7 +25,8 @@ inline void bases_in_row(const FieldEllipsoid& e, double dy, int bx, EllipsoidIn
     const hn::CappedTag<double, 8> d;
     const hn::Rebind<float, decltype(d)> df;
     for (std::size_t n = 0; n < EllipsoidInRow::kBlocks; n += hn::Lanes(d)) {
-        const auto block = hn::Iota(d, double(bx) + double(n));
+        // Not Iota() of it, which goes through memory.
+        const auto block = hn::Add(hn::Set(d, double(bx) + double(n)), hn::Iota(d, 0));
         const auto dx = hn::Sub(hn::Add(hn::Mul(block, hn::Set(d, double(kBlockEdge))), hn::Set(d, 0.5)),
                                 hn::Set(d, e.centre_x));
         const auto a = hn::Add(hn::Mul(hn::Set(d, e.xx), dx), hn::Set(d, e.xy * dy));

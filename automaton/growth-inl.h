@@ -165,7 +165,12 @@ HWY_NOINLINE void grow(const StepPlanes& p, int z0, int z1, int y0, int y1) {
                 grow_vector<false, kStream>(d, rows, w, words, hum, cld, act_next);
             }
             if (w < words) grow_vector<true, kStream>(d, rows, w, words, hum, cld, act_next);
-            if (p.boundaries.x == Boundary::periodic) wrap_row(rows.centre, hum, act_next, p.extent.x);
+        }
+        // After the layer, not after each row: words that have just been stored as part of a vector are not there to load yet.
+        if (p.boundaries.x != Boundary::periodic) continue;
+        for (int j = y0; j < y1; ++j) {
+            const std::size_t at = (std::size_t(k) * std::size_t(p.extent.y) + std::size_t(j)) * words;
+            wrap_row(p.act + at, p.hum + at, p.act_next + at, p.extent.x);
         }
     }
     if constexpr (kStream) hwy::FlushStream();  // others read act_next in the next step

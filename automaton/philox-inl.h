@@ -197,15 +197,17 @@ HWY_INLINE void philox_events(const PhiloxBatch& batch, const std::uint64_t* HWY
 //               w2 = hi(M0 w0) ^ w3 ^ k1    w3 = lo(M0 w0)                block ^ table, block
 template <int kMax>
 struct PhiloxTable {
-    PhiloxTable(const PhiloxBatch& batch, std::uint32_t draw_number) : draw(draw_number) {
+    // `sub_of(n)` is the sub-index at place n.
+    template <class SubOf>
+    PhiloxTable(const PhiloxBatch& batch, Draw draw_number, const SubOf& sub_of) : draw(std::uint32_t(draw_number)) {
         const auto k = [](const std::uint64_t(&keys)[8]) { return std::uint32_t(keys[0]); };
-        for (std::uint32_t sub = 0; sub < std::uint32_t(kMax); ++sub) {
-            const std::uint64_t product0 = std::uint64_t{kPhiloxM0} * counter_word_0(draw, sub);
+        for (std::uint32_t n = 0; n < std::uint32_t(kMax); ++n) {
+            const std::uint64_t product0 = std::uint64_t{kPhiloxM0} * counter_word_0(draw, sub_of(n));
             const std::uint64_t word = std::uint32_t(product0 >> 32) ^ batch.word3 ^ k(batch.keys.key1[0]);
             const std::uint64_t product1 = kPhiloxM1 * word;
-            w0[sub] = (product1 >> 32) ^ k(batch.keys.key0[1]);
-            w1[sub] = product1;
-            w2[sub] = std::uint32_t(product0) ^ k(batch.keys.key1[1]);
+            w0[n] = (product1 >> 32) ^ k(batch.keys.key0[1]);
+            w1[n] = product1;
+            w2[n] = std::uint32_t(product0) ^ k(batch.keys.key1[1]);
         }
     }
     std::uint32_t draw;
@@ -214,6 +216,7 @@ struct PhiloxTable {
 
 // What the first two rounds make of the block and the step.
 struct PhiloxBlock {
+    PhiloxBlock() = default;
     PhiloxBlock(const PhiloxBatch& batch, std::uint32_t block) : word2(block) {
         const std::uint64_t product1 = std::uint64_t{kPhiloxM1} * word2;
         const std::uint64_t first = (product1 >> 32) ^ batch.word1 ^ batch.keys.key0[0][0];
@@ -222,93 +225,144 @@ struct PhiloxBlock {
         w2 = product0 >> 32;
         w3 = product0;
     }
-    std::uint32_t word2;  // of the counters
-    std::uint64_t w0, w2, w3;
+    std::uint32_t word2 = 0;  // of the counters
+    std::uint64_t w0 = 0, w2 = 0, w3 = 0;
+};
+
+// Eight neighbouring sub-indices of one block.
+struct PhiloxJob {
+    std::uint8_t block;   // in the segment
+    std::uint8_t quarter;  // sub-indices 8 quarter .. 8 quarter + 7
 };
 
 #if HWY_TARGET != HWY_SCALAR
-// Calls finish(state, i) with the words of the counters with sub-index first + i, i = 0 .. count - 1; `first` and `count` are
-// multiples of 8.
-template <bool kWords01Only, int kMax, class Finish>
-HWY_INLINE void philox_by_table(const PhiloxBatch& batch, const PhiloxTable<kMax>& table,
-                                const PhiloxBlock& block, int first, int count, const Finish& finish) {
+// The lower halves of the lanes of a and of b, in turn.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V alternate(D d, V a, V b) {
+    const hn::Repartition<std::uint32_t, D> d32;
+    return hn::BitCast(d, hn::OddEven(hn::DupEven(hn::BitCast(d32, b)), hn::BitCast(d32, a)));
+}
+
+template <class D, int kMax>
+HWY_INLINE PhiloxState<D> start_at(D d, const PhiloxTable<kMax>& table, const PhiloxBlock& block, int place) {
+    return {hn::Xor(hn::LoadU(d, table.w0 + place), hn::Set(d, block.w0)), hn::LoadU(d, table.w1 + place),
+            hn::Xor(hn::LoadU(d, table.w2 + place), hn::Set(d, block.w2)), hn::Set(d, block.w3)};
+}
+#endif
+
+// Calls finish(n, i, words01, words23) for the counters of job n from the i-th on, a vector of 64 bits at a time: words 0 and
+// 1, and 2 and 3, of each. `jobs` reaches up to the next multiple of 4 with jobs that may be done twice; the table's places
+// are sub-indices.
+template <int kMax, class Finish>
+HWY_INLINE void philox_jobs(const PhiloxBatch& batch, const PhiloxTable<kMax>& table,
+                            const PhiloxBlock* blocks, const PhiloxJob* jobs, int count, const Finish& finish) {
     using D = hn::CappedTag<std::uint64_t, 8>;
     const D d;
-    const auto b0 = hn::Set(d, block.w0), b2 = hn::Set(d, block.w2), b3 = hn::Set(d, block.w3);
-    const auto start = [&](int at) HWY_ATTR {
-        const int sub = first + at;
-        return PhiloxState<D>{hn::Xor(hn::Load(d, table.w0 + sub), b0), hn::Load(d, table.w1 + sub),
-                              hn::Xor(hn::Load(d, table.w2 + sub), b2), b3};
+#if HWY_TARGET == HWY_SCALAR
+    for (int n = 0; n < count; ++n) {
+        for (int i = 0; i < 8; ++i) {
+            const auto sub = std::uint32_t(8 * jobs[n].quarter + i);
+            const PhiloxWords x =
+                philox_of(batch, pack_counter(counter_word_0(table.draw, sub), blocks[jobs[n].block].word2));
+            finish(n, i, hn::Set(d, pack_counter(x[0], x[1])), hn::Set(d, pack_counter(x[2], x[3])));
+        }
+    }
+#else
+    const auto start = [&](int n, int i) HWY_ATTR {
+        return start_at(d, table, blocks[jobs[n].block], 8 * jobs[n].quarter + i);
     };
-    constexpr std::size_t kWhole = kWords01Only ? 9 : 10;
-    const int lanes = int(hn::Lanes(d));
-    int i = 0;
+    const auto end = [&](int n, int i, const PhiloxState<D>& x) HWY_ATTR {
+        finish(n, i, alternate(d, x.w0, x.w1), alternate(d, x.w2, x.w3));
+    };
+    // Several vectors at a time hide each other's latency: as many as the registers hold.
 #if HWY_TARGET <= HWY_AVX3
-    for (; i + 4 * lanes <= count; i += 4 * lanes) {
-        auto x = start(i), y = start(i + lanes), z = start(i + 2 * lanes), w = start(i + 3 * lanes);
-        for (std::size_t round = 2; round < kWhole; ++round) {
+    for (int n = 0; n < count; n += 4) {
+        auto x = start(n, 0), y = start(n + 1, 0), z = start(n + 2, 0), w = start(n + 3, 0);
+        for (std::size_t round = 2; round < 10; ++round) {
             philox_round(d, batch.keys, round, x);
             philox_round(d, batch.keys, round, y);
             philox_round(d, batch.keys, round, z);
             philox_round(d, batch.keys, round, w);
         }
-        if (kWords01Only) {
-            philox_last_round_of_01(d, batch.keys, x);
-            philox_last_round_of_01(d, batch.keys, y);
-            philox_last_round_of_01(d, batch.keys, z);
-            philox_last_round_of_01(d, batch.keys, w);
+        end(n, 0, x);
+        end(n + 1, 0, y);
+        end(n + 2, 0, z);
+        end(n + 3, 0, w);
+    }
+#else
+    constexpr int kLanes = int(hn::MaxLanes(d));
+    for (int n = 0; n < count; ++n) {
+        for (int i = 0; i < 8; i += 2 * kLanes) {
+            auto x = start(n, i), y = start(n, i + kLanes);
+            for (std::size_t round = 2; round < 10; ++round) {
+                philox_round(d, batch.keys, round, x);
+                philox_round(d, batch.keys, round, y);
+            }
+            end(n, i, x);
+            end(n, i + kLanes, y);
         }
-        finish(x, i);
-        finish(y, i + lanes);
-        finish(z, i + 2 * lanes);
-        finish(w, i + 3 * lanes);
     }
 #endif
-    for (; i < count; i += lanes) {
-        auto x = start(i);
-        for (std::size_t round = 2; round < kWhole; ++round) philox_round(d, batch.keys, round, x);
-        if (kWords01Only) philox_last_round_of_01(d, batch.keys, x);
-        finish(x, i);
-    }
-}
-#endif
-
-// out[4*i .. 4*i+3] = Philox of the counter with sub-index i, i = 0 .. count - 1, a multiple of 8.
-template <int kMax>
-HWY_INLINE void philox_counters(const PhiloxBatch& batch, const PhiloxTable<kMax>& table,
-                                const PhiloxBlock& block, int count, std::uint32_t* HWY_RESTRICT out) {
-#if HWY_TARGET == HWY_SCALAR
-    for (int i = 0; i < count; ++i) {
-        const PhiloxWords words =
-            philox_of(batch, pack_counter(counter_word_0(table.draw, std::uint32_t(i)), block.word2));
-        std::copy(words.begin(), words.end(), out + 4 * i);
-    }
-#else
-    const hn::CappedTag<std::uint64_t, 8> d;
-    philox_by_table<false>(batch, table, block, 0, count,
-                           [&](const auto& x, int i) HWY_ATTR { store_words(d, x, out + 4 * i); });
 #endif
 }
 
-// The lower halves of word0[i] and word1[i] = words 0 and 1 of the counter with sub-index first + i, i = 0 .. count - 1;
-// `first` and `count` are multiples of 8. The upper halves are anything.
-template <int kMax>
+// Cells that are decided by words 0 and 1 of a counter each, in vectors of 32 bits: the sub-index at place n of a table such
+// that philox_words_01() has them in their order.
+inline std::uint32_t sub_of_pairs(std::uint32_t n) {
+    const auto lanes = std::uint32_t(hn::Lanes(hn::CappedTag<std::uint64_t, 8>()));
+    return n / (2 * lanes) * (2 * lanes) + n % lanes * 2 + n / lanes % 2;
+}
+
+// Calls finish(c, word0, word1) with the words 0 and 1 of the sub-indices first + c, first + c + 1, ... of a block, a vector
+// of 32 bits at a time, c < 64; the table is in the order of sub_of_pairs().
+template <int kMax, class Finish>
 HWY_INLINE void philox_words_01(const PhiloxBatch& batch, const PhiloxTable<kMax>& table,
-                                const PhiloxBlock& block, int first, int count,
-                                std::uint64_t* HWY_RESTRICT word0, std::uint64_t* HWY_RESTRICT word1) {
+                                const PhiloxBlock& block, int first, const Finish& finish) {
 #if HWY_TARGET == HWY_SCALAR
-    for (int i = 0; i < count; ++i) {
-        const auto sub = std::uint32_t(first + i);
-        const PhiloxWords words =
-            philox_of(batch, pack_counter(counter_word_0(table.draw, sub), block.word2));
-        word0[i] = words[0], word1[i] = words[1];
+    const hn::CappedTag<std::uint32_t, 16> d32;
+    for (int c = 0; c < 64; ++c) {
+        const auto sub = std::uint32_t(first + c);
+        const PhiloxWords x = philox_of(batch, pack_counter(counter_word_0(table.draw, sub), block.word2));
+        finish(c, hn::Set(d32, x[0]), hn::Set(d32, x[1]));
     }
 #else
-    const hn::CappedTag<std::uint64_t, 8> d;
-    philox_by_table<true>(batch, table, block, first, count, [&](const auto& x, int i) HWY_ATTR {
-        hn::StoreU(x.w0, d, word0 + i);
-        hn::StoreU(x.w1, d, word1 + i);
-    });
+    using D = hn::CappedTag<std::uint64_t, 8>;
+    const D d;
+    const hn::Repartition<std::uint32_t, D> d32;
+    constexpr int kLanes = int(hn::MaxLanes(d));
+    const auto end = [&](int c, const PhiloxState<D>& x, const PhiloxState<D>& y) HWY_ATTR {
+        finish(c, hn::BitCast(d32, alternate(d, x.w0, y.w0)), hn::BitCast(d32, alternate(d, x.w1, y.w1)));
+    };
+#if HWY_TARGET <= HWY_AVX3
+    for (int c = 0; c < 64; c += 4 * kLanes) {
+        auto x = start_at(d, table, block, first + c), y = start_at(d, table, block, first + c + kLanes),
+             z = start_at(d, table, block, first + c + 2 * kLanes),
+             w = start_at(d, table, block, first + c + 3 * kLanes);
+        for (std::size_t round = 2; round < 9; ++round) {
+            philox_round(d, batch.keys, round, x);
+            philox_round(d, batch.keys, round, y);
+            philox_round(d, batch.keys, round, z);
+            philox_round(d, batch.keys, round, w);
+        }
+        philox_last_round_of_01(d, batch.keys, x);
+        philox_last_round_of_01(d, batch.keys, y);
+        philox_last_round_of_01(d, batch.keys, z);
+        philox_last_round_of_01(d, batch.keys, w);
+        end(c, x, y);
+        end(c + 2 * kLanes, z, w);
+    }
+#else
+    for (int c = 0; c < 64; c += 2 * kLanes) {
+        auto x = start_at(d, table, block, first + c), y = start_at(d, table, block, first + c + kLanes);
+        for (std::size_t round = 2; round < 9; ++round) {
+            philox_round(d, batch.keys, round, x);
+            philox_round(d, batch.keys, round, y);
+        }
+        philox_last_round_of_01(d, batch.keys, x);
+        philox_last_round_of_01(d, batch.keys, y);
+        end(c, x, y);
+    }
+#endif
 #endif
 }
 

@@ -9,8 +9,6 @@
 namespace nephos {
 namespace {
 
-constexpr int kLowestOctave = -28;
-
 // exp(-x) for 0 <= x <= 1 by its series; the first term left out is below 1e-19.
 double exp_minus(double x) {
     double sum = 1;
@@ -52,14 +50,6 @@ PoissonLadder::PoissonLadder() {
         }
     }
     tables_.push_back(make_poisson_table(1));
-}
-
-const PoissonTable& PoissonLadder::level(float rate) const {
-    assert(rate >= 0 && rate <= 1);
-    // Exponent and two bits of mantissa, rounded up, are the number of the level.
-    const int number =
-        int((std::bit_cast<std::uint32_t>(rate) + 0x1FFFFFu) >> 21) - ((127 + kLowestOctave) << 2);
-    return tables_[std::size_t(std::max(number, 0))];
 }
 
 }  // namespace nephos

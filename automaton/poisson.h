@@ -9,7 +9,10 @@
 //
 // Rates come from a ladder, 4 an octave, so that the tables are made once.
 
+#include <algorithm>
 #include <array>
+#include <bit>
+#include <cassert>
 #include <cstdint>
 #include <vector>
 
@@ -40,9 +43,15 @@ class PoissonLadder {
   public:
     PoissonLadder();
     // Returns the table with the lowest rate >= `rate`, which must be in 0..1.
-    const PoissonTable& level(float rate) const;
+    const PoissonTable& level(float rate) const {
+        assert(rate >= 0 && rate <= 1);
+        // Exponent and two bits of mantissa, rounded up, are the number of the level.
+        const int number = int((std::bit_cast<std::uint32_t>(rate) + 0x1FFFFFu) >> 21) - ((127 + kLowestOctave) << 2);
+        return tables_[std::size_t(std::max(number, 0))];
+    }
 
   private:
+    static constexpr int kLowestOctave = -28;
     std::vector<PoissonTable> tables_;
 };
 

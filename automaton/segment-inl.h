@@ -30,8 +30,8 @@ inline constexpr int kMaxLanes64 = 8;  // of 64 bits, in the widest vector
 // Blocks are taken in segments of 64 along x, so that everything below has a fixed size.
 inline constexpr int kSegmentBlocks = 64;
 inline constexpr int kSegmentWords = kSegmentBlocks * kBlockEdge / 64;
+inline constexpr int kMaxJobs = 4 * kSegmentBlocks + 4;  // of a draw; up to 3 more may be written
 inline constexpr int kMaxCounters = 512;  // queued before the sparse draws are run
-inline constexpr int kMaxTies = 512;      // queued before they are decided
 
 // An ellipsoid in one layer of a block, for one draw.
 struct LayerEllipsoid {
@@ -65,28 +65,26 @@ struct SparseJob {
     SparseRates rates;
 };
 
-// A bit for each cell of a block: bit c % 64 of word c / 64 is the cell c = x + 8 y + 64 z.
+// A bit for each cell of a block, 64 rows of 8 cells, y fastest: a byte each, in one of two orders.
 using CellBits = std::uint64_t[8];
 
-// Cells of a layer whose random byte equals the top byte of their threshold: 24 more bits decide.
-struct LayerTies {
-    std::uint64_t cells;
-    std::uint32_t below;  // an event if the 24 bits are less than this
-    std::uint8_t block, draw, layer;
+enum class BitOrder {
+    layers,  // bit c % 64 of word c / 64 is the cell c = x + 8 y + 64 z
+    words,   // that of Philox's words in a dense draw, a byte a cell: byte i of word 2 v + h is decided by the words 2 h and
+             // 2 h + 1 of sub-index 8 v + i
 };
 
-// One of them.
-struct Tie {
-    int block, draw;
-    std::uint32_t cell;
-    std::uint32_t below;
-};
+// Returns the row y + 8 z of a byte of a word.
+constexpr int row_of(BitOrder order, int word, int byte) {
+    return order == BitOrder::layers ? 8 * word + byte : 16 * (word / 2) + 2 * byte + word % 2;
+}
 
 // Memory of one thread.
 struct BirthScratch {
-    alignas(64) CellBits
-        dense_events[3][kSegmentBlocks] = {};            // those of the dense draws; 0 between segments
-    alignas(64) CellBits cloud[kSegmentBlocks];          // cells that are cld, see cloud_of_block()
+    alignas(64) CellBits events[2][kSegmentBlocks];  // of the dense draw at hand; of hum and act in the first state
+    alignas(64) CellBits ties[kSegmentBlocks];       // cells whose byte equals the top byte of their threshold
+    alignas(64) CellBits cloud[kSegmentBlocks];      // cells that are cld, see cloud_of_block()
+    alignas(64) CellBits born[kSegmentBlocks];       // cells that are hum, or act, while that is drawn
     std::uint64_t counters[kMaxCounters + kMaxLanes64];  // packed, see philox-inl.h
     // The two words of each event; 16 more, as the last vector of events reads beyond.
     std::uint32_t first[2 * (kMaxCounters + kMaxLanes64) + 16], second[2 * (kMaxCounters + kMaxLanes64) + 16];
@@ -104,10 +102,17 @@ struct BirthScratch {
     std::optional<PhiloxTable<kBlockCells>> initial_table;  // of the first state
     SparseJob jobs[kSegmentBlocks];
     int job_count = 0, counter_count = 0;
-    LayerTies ties[kMaxTies];
-    int tie_count = 0;
-    unsigned dense_words[3] = {};  // words of its rows, a bit each, that have events of the dense draw
-    unsigned known_cloud = 0;      // words of the segment's rows, a bit each, whose 8 blocks are in `cloud`
+    // The dense draw at hand: quarters of blocks where p is the same in all cells; where it varies and is computed in all
+    // cells; and where it is computed in the few that its bounds do not decide.
+    PhiloxJob uniform_jobs[kMaxJobs], varying_jobs[kMaxJobs], undecided_jobs[kMaxJobs];
+    PhiloxBlock philox_blocks[kSegmentBlocks];
+    std::uint64_t known_philox = 0;  // blocks, a bit each, that are in philox_blocks
+    // Of blocks with one threshold: its top byte in each byte, and what is left for ties.
+    std::uint64_t tops[kSegmentBlocks];
+    std::uint64_t high_tops[kSegmentBlocks];  // where p varies: `tops` of its lower bound, these of its upper bound
+    std::uint32_t tie_thresholds[kSegmentBlocks];
+    std::uint8_t dense_blocks[3][kSegmentBlocks];  // of each draw
+    unsigned known_cloud = 0;  // words of the segment's rows, a bit each, whose 8 blocks are in `cloud`
     std::vector<float> columns;    // see locate_columns()
     std::vector<LayerEllipsoid> layer;
     std::vector<const FieldEllipsoid*> row;
@@ -126,9 +131,10 @@ struct Segment {
     PhiloxBatch batch() const {
         return {keys, random.step, std::uint32_t(bz) | std::uint32_t(Domain::lattice) << 16};
     }
+    // Word 2 of the block's counters.
+    std::uint32_t block_word(int block) const { return std::uint32_t(bx0 + block) | std::uint32_t(by) << 16; }
     std::uint64_t counter(Draw draw, int block, std::uint32_t sub) const {
-        const std::uint32_t word2 = std::uint32_t(bx0 + block) | std::uint32_t(by) << 16;
-        return pack_counter(counter_word_0(std::uint32_t(draw), sub), word2);
+        return pack_counter(counter_word_0(std::uint32_t(draw), sub), block_word(block));
     }
 };
 

@@ -86,13 +86,14 @@ HWY_INLINE hn::Mask<DU> has_cloud(DU du, const CellBits& cloud, V first) {
         return hn::TableLookupLanes(hn::LoadU(du, table), hn::IndicesFromVec(du, index));
     };
     const auto index = hn::ShiftRight<5>(first);
-#if HWY_TARGET <= HWY_AVX3
-    const auto word = look_up(words, hn::And(index, hn::Set(du, 15)));
-#else
-    const auto lane = hn::And(index, hn::Set(du, 7));
-    const auto upper = hn::TestBit(index, hn::Set(du, 8));
-    const auto word = hn::IfThenElse(upper, look_up(words + 8, lane), look_up(words, lane));
-#endif
+    V word;
+    if constexpr (hn::MaxLanes(du) >= 16) {
+        word = look_up(words, hn::And(index, hn::Set(du, 15)));
+    } else {
+        const auto lane = hn::And(index, hn::Set(du, 7));
+        const auto upper = hn::TestBit(index, hn::Set(du, 8));
+        word = hn::IfThenElse(upper, look_up(words + 8, lane), look_up(words, lane));
+    }
     const auto bit = hn::Shl(word, hn::AndNot(first, hn::Set(du, 31)));
     return hn::RebindMask(du, hn::Lt(hn::BitCast(di, bit), hn::Zero(di)));
 }
@@ -134,54 +135,91 @@ HWY_INLINE EventRates<V> rates_at(DF d, const SparseJob& job, const BlockPlan& p
     return {hum, act, ext, two, hn::Add(two, ext)};
 }
 
-// Runs one sparse job whose words are ready. Makes the choice of sparse_draw() in float32, whose v and sums
-// of rates are right to 2^-22 of the level's rate, and leaves events to run_close() whose v lies within
-// 2^-21 of a sum: three in a million. Extinctions where there is no cloud are left out, as nothing would happen.
+// What the vectors of a job have in common.
+template <class DF>
+struct JobVectors {
+    using V = hn::Vec<DF>;
+    using VU = hn::Vec<hn::RebindToUnsigned<DF>>;
+    JobVectors(DF d, const SparseJob& job)
+        : unit(hn::Set(d, job.rates.unit)),
+          slack(hn::Set(d, job.rates.unit * 0x1p10f)),
+          of_hum(hn::Set(hn::RebindToUnsigned<DF>(), pack_event(job.block, kHum, 0))),
+          of_act(hn::Set(hn::RebindToUnsigned<DF>(), pack_event(job.block, kAct, 0))),
+          of_ext(hn::Set(hn::RebindToUnsigned<DF>(), pack_event(job.block, kExt, 0))) {}
+    V unit, slack;
+    VU of_hum, of_act, of_ext;
+};
+
+// Decides the events of a vector from `at` on, of which `left` are those of the job. Makes the choice of sparse_draw() in
+// float32, whose v and sums of rates are right to 2^-22 of the level's rate, and leaves events to run_close() whose v lies
+// within 2^-21 of a sum: three in a million. Extinctions where there is no cloud are left out, as nothing would happen; `cloud`
+// is null where none can be. Rates stay where they are: a copy in parts would be read in whole before it has reached the cache.
+template <class DF>
+HWY_INLINE void decide_events(DF d, const SparseJob& job, const JobVectors<DF>& common,
+                              const EventRates<hn::Vec<DF>>& rates, const CellBits* cloud, int at, int left,
+                              BirthScratch& s) {
+    const hn::RebindToUnsigned<DF> du;
+    const hn::RebindToSigned<DF> di;
+    const auto first = hn::LoadU(du, s.first + at);
+    const auto v =
+        hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<1>(hn::LoadU(du, s.second + at)))), common.unit);
+    const auto distance = hn::Min(hn::AbsDiff(v, rates.hum),
+                                  hn::Min(hn::AbsDiff(v, rates.two), hn::AbsDiff(v, rates.three)));
+    const auto used = hn::FirstN(d, std::size_t(left));
+    const auto up_to_act = hn::Lt(v, rates.two);
+    auto accepted = hn::And(used, hn::Lt(v, rates.three));
+#if HWY_TARGET <= HWY_AVX2
+    if (cloud != nullptr)
+        accepted = hn::And(accepted, hn::Or(up_to_act, hn::RebindMask(d, has_cloud(du, *cloud, first))));
+#else
+    (void)cloud;
+#endif
+    const auto close = hn::And(used, hn::Lt(distance, common.slack));
+    if (HWY_UNLIKELY(!hn::AllFalse(d, close))) {
+        run_close(d, job, close, at, rates.hum, rates.act, rates.ext, s);
+        accepted = hn::AndNot(close, accepted);
+    }
+    const auto accepted_u = hn::RebindMask(du, accepted);
+    const auto of_draw = hn::IfThenElse(hn::RebindMask(du, hn::Lt(v, rates.hum)), common.of_hum,
+                                        hn::IfThenElse(hn::RebindMask(du, up_to_act), common.of_act, common.of_ext));
+    const auto event = hn::Or(hn::And(first, hn::Set(du, 511)), of_draw);
+    hn::StoreU(compress(du, event, accepted_u), du, s.accepted + s.accepted_count);
+    s.accepted_count += int(hn::CountTrue(du, accepted_u));
+}
+
+// Runs one sparse job whose words are ready. Where p varies, its last events take half a vector if that holds them: most jobs
+// have no more, and processors that halve the widest vectors are done earlier.
 template <bool kUniform>
 HWY_INLINE void run_sparse([[maybe_unused]] const Segment& g, const SparseJob& job, BirthScratch& s) {
     const hn::ScalableTag<float> d;
-    const hn::RebindToUnsigned<decltype(d)> du;
-    const hn::RebindToSigned<decltype(d)> di;
-    using V = hn::Vec<decltype(d)>;
-    const int lanes = int(hn::Lanes(d));
     const BlockPlan& plan = s.plans[std::size_t(job.block)];
-    const auto unit = hn::Set(d, job.rates.unit), slack = hn::Set(d, job.rates.unit * 0x1p10f);
-    EventRates<V> rates{hn::Set(d, job.rates.hum), hn::Set(d, job.rates.act), hn::Set(d, job.rates.ext),
-                        hn::Set(d, job.rates.two), hn::Set(d, job.rates.three)};
-    const auto of_hum = hn::Set(du, pack_event(job.block, kHum, 0)),
-               of_act = hn::Set(du, pack_event(job.block, kAct, 0)),
-               of_ext = hn::Set(du, pack_event(job.block, kExt, 0));
+    const CellBits* cloud = nullptr;
 #if HWY_TARGET <= HWY_AVX2
-    const bool extinguishes = (job.draws & 1u << kExt) != 0;
-    const CellBits& cloud = extinguishes ? cloud_of_block(g, job.block, s) : s.cloud[0];
+    if ((job.draws & 1u << kExt) != 0) cloud = &cloud_of_block(g, job.block, s);
 #endif
-    for (int e = 0; e < job.events; e += lanes) {
-        const int at = 2 * job.first + e;
-        const auto first = hn::LoadU(du, s.first + at);
-        if constexpr (!kUniform) rates = rates_at(d, job, plan, first);
-        const auto v =
-            hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<1>(hn::LoadU(du, s.second + at)))), unit);
-        const auto distance = hn::Min(hn::AbsDiff(v, rates.hum),
-                                      hn::Min(hn::AbsDiff(v, rates.two), hn::AbsDiff(v, rates.three)));
-        const auto used = hn::FirstN(d, std::size_t(job.events - e));
-        const auto up_to_act = hn::Lt(v, rates.two);
-        auto accepted = hn::And(used, hn::Lt(v, rates.three));
-#if HWY_TARGET <= HWY_AVX2
-        if (extinguishes)
-            accepted = hn::And(accepted, hn::Or(up_to_act, hn::RebindMask(d, has_cloud(du, cloud, first))));
-#endif
-        const auto close = hn::And(used, hn::Lt(distance, slack));
-        if (HWY_UNLIKELY(!hn::AllFalse(d, close))) {
-            run_close(d, job, close, at, rates.hum, rates.act, rates.ext, s);
-            accepted = hn::AndNot(close, accepted);
-        }
-        const auto accepted_u = hn::RebindMask(du, accepted);
-        const auto of_draw = hn::IfThenElse(hn::RebindMask(du, hn::Lt(v, rates.hum)), of_hum,
-                                            hn::IfThenElse(hn::RebindMask(du, up_to_act), of_act, of_ext));
-        const auto event = hn::Or(hn::And(first, hn::Set(du, 511)), of_draw);
-        hn::StoreU(hn::Compress(event, accepted_u), du, s.accepted + s.accepted_count);
-        s.accepted_count += int(hn::CountTrue(du, accepted_u));
+    const int lanes = int(hn::Lanes(d)), at = 2 * job.first;
+    const JobVectors<hn::ScalableTag<float>> common(d, job);
+    if constexpr (kUniform) {
+        const EventRates<hn::Vec<hn::ScalableTag<float>>> rates{hn::Set(d, job.rates.hum), hn::Set(d, job.rates.act),
+                                                                hn::Set(d, job.rates.ext), hn::Set(d, job.rates.two),
+                                                                hn::Set(d, job.rates.three)};
+        for (int e = 0; e < job.events; e += lanes)
+            decide_events(d, job, common, rates, cloud, at + e, job.events - e, s);
+        return;
     }
+    const auto decide = [&](auto tag, const auto& vectors, int e) HWY_ATTR {
+        const hn::RebindToUnsigned<decltype(tag)> du;
+        const auto rates = rates_at(tag, job, plan, hn::LoadU(du, s.first + at + e));
+        decide_events(tag, job, vectors, rates, cloud, at + e, job.events - e, s);
+    };
+    int e = 0;
+#if HWY_TARGET <= HWY_AVX3
+    for (; e + lanes / 2 < job.events; e += lanes) decide(d, common, e);
+    const hn::Half<hn::ScalableTag<float>> half;
+    if (e < job.events) decide(half, JobVectors<hn::Half<hn::ScalableTag<float>>>(half, job), e);
+#else
+    for (; e < job.events; e += lanes) decide(d, common, e);
+#endif
 }
 
 // Makes the words of all queued sparse draws and runs them.
@@ -234,27 +272,43 @@ inline void queue_sparse(const Segment& g, int block, unsigned draws, BirthScrat
     const auto& values = plan.background.values;
     const bool uniform = plan.ellipsoids.empty() && values[kHum] == nullptr && values[kAct] == nullptr &&
                          values[kExt] == nullptr;
-    SparseRates rates{};
+    const UniformDraws* known = nullptr;
     const PoissonTable* table = nullptr;
     if (uniform) {
-        const UniformDraws& known = uniform_draws(g, plan, draws, s);
-        table = known.table;
-        rates = known.rates;
+        known = &uniform_draws(g, plan, draws, s);
+        table = known->table;
     } else {
+        // Sums as in sparse_rate_bound(): adding 0 changes nothing.
         float bound = 0;
-        for (std::size_t draw = 0; draw < 3; ++draw) {
-            if ((draws >> draw & 1) != 0) bound += s.rate_bounds[draw][block];
-        }
+        for (std::size_t draw = 0; draw < 3; ++draw)
+            bound += (draws >> draw & 1) != 0 ? s.rate_bounds[draw][block] : 0.0f;
         table = &g.random.ladder->level(bound);
-        rates.unit = float(table->rate) * 0x1p-31f;
     }
     const int events = table->events(s.counts[4 * block]);
     if (events == 0) return;
     const int counters = (events + 1) / 2;
     if (s.counter_count + counters > kMaxCounters) run_queue(g, s);
-    s.jobs[s.job_count++] = {block, draws, events, s.counter_count, uniform, rates};
+    // Written where it stays: a copy of what has just been set, by wider loads, would wait for it to reach the cache.
+    SparseJob& job = s.jobs[s.job_count++];
+    job.block = block;
+    job.draws = draws;
+    job.events = events;
+    job.first = s.counter_count;
+    job.uniform = uniform;
+    if (uniform) {
+        job.rates = known->rates;
+    } else {
+        job.rates.unit = float(table->rate) * 0x1p-31f;
+    }
+    // Whole vectors, as the array has room: most blocks have no more counters than one.
+    const hn::ScalableTag<std::uint64_t> d;
     const std::uint64_t first = g.counter(Draw::sparse, block, 0);
-    for (int c = 0; c < counters; ++c) s.counters[s.counter_count + c] = first + std::uint64_t(c);
+    std::uint64_t* const to = s.counters + s.counter_count;
+    auto next = rising_from(d, first);
+    for (int c = 0; c < counters; c += int(hn::Lanes(d))) {
+        hn::StoreU(next, d, to + c);
+        next = hn::Add(next, hn::Set(d, std::uint64_t(hn::Lanes(d))));
+    }
     s.counter_count += counters;
 }
 

@@ -59,11 +59,9 @@ TEST(BirthScratch, IsEmptyAfterAPartThatFailed) {
         s.job_count = target::kSegmentBlocks;
         s.counter_count = target::kMaxCounters;
         s.accepted_count = 7;
-        s.tie_count = target::kMaxTies;
-        for (int draw = 0; draw < 3; ++draw) {
-            s.dense_words[draw] = 3;
-            std::fill_n(&s.dense_events[draw][0][0], 8 * 16, ~std::uint64_t{0});
-        }
+        std::fill_n(&s.events[0][0][0], 8 * target::kSegmentBlocks, ~std::uint64_t{0});
+        std::fill_n(&s.ties[0][0], 8 * target::kSegmentBlocks, ~std::uint64_t{0});
+        s.known_cloud = ~0u;
         throw std::bad_alloc();
     };
     EXPECT_THROW(failing.draw(fail), std::bad_alloc);

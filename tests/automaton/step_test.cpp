@@ -244,6 +244,46 @@ TEST(Determinism, InstructionSetsDrawRowsOfAnyLength) {
     }
 }
 
+// Extinction of any density of cloud where p varies: thin cloud is decided cell by cell, from bounds on p, thick cloud by whole
+// layers, and each instruction set gives the bits of the naive twin. Births as frequent are beside it, and blocks of two
+// segments, of which the last is cut on each axis. An ellipsoid has p = 0 at its centre, another p = 1.
+TEST(Determinism, InstructionSetsExtinguishThinAndThickCloud) {
+    AutomatonOptions o{.extent = {521, 19, 12}, .seed = 77};
+    o.boundaries = {Boundary::periodic, Boundary::open, Boundary::open};
+    o.placement.cell_size_m = 10;
+    const auto ellipsoid = [&](double x, const Probabilities& centre, const Probabilities& rim) {
+        Ellipsoid e;
+        e.centre_m = {x, 90, 55};
+        e.semi_axes_m = {900, 130, 70};
+        e.yaw_deg = 7;
+        e.centre = centre;
+        e.rim = rim;
+        o.field.ellipsoids.push_back(e);
+    };
+    ellipsoid(600, {0.9, 0.4, 0.1}, {0.2, 0, 0.35});
+    ellipsoid(1700, {0.5, 0.001, 0}, {0, 0, 0.3});
+    ellipsoid(3000, {1, 0.3, 0.05}, {0, 0, 0.35});
+    ellipsoid(3600, {0.3, 0.3, 0.2}, {0.1, 0, 0.9});
+    for (const double background_ext : {0.3, 0.9, 1.0}) {
+        for (const double density : {0.004, 0.05, 0.3, 1.0}) {
+            SCOPED_TRACE("ext " + std::to_string(background_ext) + ", cloud " + std::to_string(density));
+            o.field.background = {0, 0.26, background_ext};
+            Dice dice{5};
+            Lattice start{BitPlane(o.extent), BitPlane(o.extent), BitPlane(o.extent)};
+            for (int k = 0; k < o.extent.z; ++k)
+                for (int j = 0; j < o.extent.y; ++j)
+                    for (int i = 0; i < o.extent.x; ++i) start.cld.set(i, j, k, dice.real(0, 1) < density);
+            reference::Cells twin = reference::to_cells(start.hum.view(), start.act.view(), start.cld.view());
+            reference::extinguish_and_bear(twin, o, 0, Automaton(o, start).ellipsoids());
+            test::with_each_target([&] {
+                Automaton automaton(o, start);
+                automaton.step();
+                EXPECT_TRUE(reference::to_cells(automaton.hum(), automaton.act(), automaton.cld()) == twin);
+            });
+        }
+    }
+}
+
 TEST(Determinism, EveryStepOfADrawnOutScatterIsReproduced) {
     AutomatonOptions o{.extent = {96, 64, 16}};
     o.wind.keyframes = {{0, {{0, {25, -12}}}}};

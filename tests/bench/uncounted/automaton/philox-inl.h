@@ -68,25 +68,41 @@ HWY_INLINE void philox_events(const PhiloxBatch&, const std::uint64_t*, int coun
 
 template <int kMax>
 struct PhiloxTable {
-    PhiloxTable(const PhiloxBatch&, std::uint32_t) {}
+    template <class SubOf>
+    PhiloxTable(const PhiloxBatch&, Draw, const SubOf&) {}
 };
 
 struct PhiloxBlock {
+    PhiloxBlock() = default;
     PhiloxBlock(const PhiloxBatch&, std::uint32_t) {}
 };
 
-template <int kMax>
-HWY_INLINE void philox_counters(const PhiloxBatch&, const PhiloxTable<kMax>&, const PhiloxBlock&, int count,
-                                std::uint32_t* HWY_RESTRICT out) {
-    uncounted_words(count, reinterpret_cast<std::uint64_t*>(out));
+struct PhiloxJob {
+    std::uint8_t block, quarter;
+};
+
+template <int kMax, class Finish>
+HWY_INLINE void philox_jobs(const PhiloxBatch&, const PhiloxTable<kMax>&, const PhiloxBlock*, const PhiloxJob*,
+                            int count, const Finish& finish) {
+    const hn::CappedTag<std::uint64_t, 8> d;
+    HWY_ALIGN std::uint64_t words[16];
+    for (int n = 0; n < count; ++n) {
+        uncounted_words(8, words);
+        for (int i = 0; i < 8; i += int(hn::Lanes(d))) finish(n, i, hn::Load(d, words + i), hn::Load(d, words + 8 + i));
+    }
 }
 
-template <int kMax>
+inline std::uint32_t sub_of_pairs(std::uint32_t n) { return n; }
+
+template <int kMax, class Finish>
 HWY_INLINE void philox_words_01(const PhiloxBatch&, const PhiloxTable<kMax>&, const PhiloxBlock&, int,
-                                int count, std::uint64_t* HWY_RESTRICT word0,
-                                std::uint64_t* HWY_RESTRICT word1) {
-    uncounted_words(count / 2, word0);
-    uncounted_words(count / 2, word1);
+                                const Finish& finish) {
+    const hn::CappedTag<std::uint32_t, 16> d;
+    HWY_ALIGN std::uint64_t words[64];
+    uncounted_words(32, words);
+    const auto* const of_cells = reinterpret_cast<const std::uint32_t*>(words);
+    for (std::size_t c = 0; c < 64; c += hn::Lanes(d))
+        finish(int(c), hn::Load(d, of_cells + c), hn::Load(d, of_cells + 64 + c));
 }
 
 }  // namespace nephos::HWY_NAMESPACE
