@@ -85,7 +85,8 @@ class Renderer {
     //
     // The memory behind the spans of `splats` must not change until the frame is finished. Pictures have the
     // same bits as those of draw_splats(), in whatever order they are finished. At most two frames are in
-    // flight: begin() of a third waits for the first, and of one with another cloud or sky for both. The
+    // flight: begin() of a third waits for the first, and of one with another cloud or sky, or with ground that mirrors, for
+    // both. The
     // back-ends cpu and blended draw in begin(), as do all back-ends with ground that is not level, or veils. Both throw
     // as draw_splats(); an error of a frame in flight is thrown by its own finish(). Only the Renderer that
     // began a frame may finish it, and only once.

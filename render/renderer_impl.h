@@ -78,7 +78,8 @@ struct Renderer::Impl {
                                         const DetailView& detail);
     // Draws a frame over which the processor draws: ground that is not plain or not level, veils per pixel.
     Picture draw_in_passes(Drawing& drawing);
-    // The passes: wet, snowy or farmed ground, where the back-end does not draw it; veils. They change `picture`, which was drawn with `detail`.
+    // The passes: wet, snowy or farmed ground, where the back-end does not draw it; veils. They change `picture`, which
+    // was drawn with `detail`.
     void draw_ground(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
                      const DetailView& detail, const MirrorView* mirror, Picture& picture);
     void draw_veils_of(const Splats& splats, const RenderOptions& options, const DetailView& detail,

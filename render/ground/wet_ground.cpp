@@ -57,7 +57,7 @@ HWY_INLINE Surface wet_surface(const GroundPass& pass, const Seen& seen, const L
     if (pass.mirror == nullptr) return surface;
     const Floats strength = set(pass.reflection);
     const auto reflects = [&](Floats fraction, Floats slope_x, Floats slope_y, Floats blur) {
-        if (hn::AllFalse(d, hn::Gt(fraction, set(1.0e-4f)))) return;
+        if (hn::AllFalse(d, hn::Gt(fraction, hn::Zero(d)))) return;
         const Floats3 light = reflected(pass, seen, mirrored_ray(seen.ray, slope_x, slope_y), blur);
         surface.reflected = times_add(hn::Mul(strength, fraction), light, surface.reflected);
     };

@@ -2,7 +2,7 @@
 #pragma once
 
 // Draws the ground of a height map into a finished picture, whose back-end has left its pixels dark behind the clouds: one
-// implementation for all back-ends, as the one of level ground (render/ground/wet_ground.h).
+// implementation for all back-ends.
 //
 //     beauty += transmittance (beta (albedo * light + reflected) + light of the air)
 //

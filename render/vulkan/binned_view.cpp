@@ -264,7 +264,7 @@ void BinnedView::use_mirror(const MirrorView& view) {
 
 void BinnedView::record_ground(const vk::raii::CommandBuffer& commands, Slot& slot, const Resources& resources) {
     Resources all = resources;
-    slot.ground.add_to(all, mirror_.texels());
+    slot.ground.add_to(all, mirror_.texels(gpu_));
     pass_barrier(commands);
     begin_compute(commands, *slot.ground_of, slot.sets.fill(*slot.ground_of, all), step_over({slot.part.width, slot.part.height}));
     dispatch_groups(commands, (pixels_of(slot.part) + shader::kComputeGroup - 1) / shader::kComputeGroup);
@@ -392,8 +392,9 @@ void BinnedView::reserve(const PicturePart& part, Slot& slot) {
                           .billboards = slot.billboard_count,
                           .tiles = tiles,
                           .entries = std::min(std::max<std::size_t>(4 * splats, tiles), limits.entries)};
+    // What is in flight may be drawn once more if its lists were too short, into what it was given.
     if (!lists_.has_room(sizes) || depth_.bytes < sizeof(float) * pixels) {
-        wait();
+        flush();
         lists_.reserve(gpu_, sizes);
         ordered_ = nullptr;
         depth_ = {};  // until both are there
@@ -401,7 +402,7 @@ void BinnedView::reserve(const PicturePart& part, Slot& slot) {
         make_storage(gpu_, depth_, sizeof(float) * pixels);
     }
     if (slot.what.variant.march && !slot.what.volumes->has_room(pixels)) {
-        wait();
+        flush();
         slot.what.volumes->reserve(gpu_, pixels);
     }
     reserve_copy(gpu_, slot.radiance, 4 * sizeof(float) * pixels);

@@ -16,8 +16,11 @@ shader::GroundMirrorLevel level_of(const MirrorView::Level& level) {
 }  // namespace
 
 DeviceMirror::DeviceMirror(const GpuDevice& gpu)
-    : level_(create_compute_pipeline(gpu, shaders().mirror_level_comp)), sets_(gpu) {
-    make_storage(gpu, texels_, kTexelBytes);
+    : level_(create_compute_pipeline(gpu, shaders().mirror_level_comp)), sets_(gpu) {}
+
+const GpuBuffer& DeviceMirror::texels(const GpuDevice& gpu) {
+    reserve_storage(gpu, texels_, kTexelBytes);
+    return texels_;
 }
 
 void DeviceMirror::begin(const GpuDevice& gpu, const Camera& camera) {

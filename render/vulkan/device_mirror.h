@@ -13,10 +13,9 @@ namespace nephos {
 
 class DeviceMirror {
   public:
-    // With a texel that is never read: descriptors must be there, used or not.
     explicit DeviceMirror(const GpuDevice& gpu);
 
-    // All of them: nothing that reads the texels may be in flight.
+    // While any of these three is called, nothing that reads the texels may be in flight.
     // Makes room for the view of a camera.
     void begin(const GpuDevice& gpu, const Camera& camera);
     // Copies the pixels of a part into the first level.
@@ -27,7 +26,8 @@ class DeviceMirror {
     void use(const GpuDevice& gpu, const MirrorView& view);
 
     const MirrorView& layout() const { return layout_; }  // without texels
-    const GpuBuffer& texels() const { return texels_; }
+    // For descriptors, which must be there, used or not: at least one texel, also where memory ran out before.
+    const GpuBuffer& texels(const GpuDevice& gpu);
 
   private:
     Pipeline level_;

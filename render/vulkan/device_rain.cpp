@@ -13,7 +13,6 @@ namespace nephos {
 namespace {
 
 constexpr std::size_t kFramesInFlight = 2;
-constexpr std::size_t kPrepared = kFramesInFlight + 1;  // two in flight, and the next
 
 void copy(const vk::raii::CommandBuffer& commands, const GpuBuffer& from, const GpuBuffer& to,
           std::size_t bytes) {
@@ -94,7 +93,6 @@ DeviceRain::DeviceRain(const GpuDevice& gpu, const vk::raii::Sampler& white_beyo
       bands_of_(create_compute_pipeline(gpu, shaders().rain_bands_comp)),
       tiles_(create_compute_pipeline(gpu, shaders().rain_tiles_comp)) {
     for (std::size_t n = 0; n < kFramesInFlight; ++n) slots_.push_back(std::make_unique<Slot>(gpu));
-    for (std::size_t n = 0; n < kPrepared; ++n) prepared_.push_back(std::make_unique<Prepared>(gpu));
     const std::vector<shader::vec4> nodes = bow_nodes();
     make_storage(gpu, bow_, sizeof(shader::vec4) * nodes.size());
     upload_staged(gpu, bow_, std::as_bytes(std::span(nodes)));
@@ -156,15 +154,16 @@ bool DeviceRain::prepare(const RainFrame& rain, const Weather& weather, const Pi
     std::optional<RainData> data = rain_data(rain, weather, picture);
     const std::size_t width = std::size_t(picture.width), rows = std::size_t(picture.height);
     if (!data || !fits(rain, *data) || picture.height > most_rows) return false;
-    next_prepared_ = (next_prepared_ + 1) % prepared_.size();
-    Prepared& next = *prepared_[next_prepared_];
-    next.strip = {};
+    prepared_ = nullptr;
     if (!data->shafts && data->passes.empty() && data->splashes.empty()) return true;
     ++pictures;
     use_all_of(rain, weather);
     reserve_shared(width * rows, groups_of(rows, shader::kStreakBandRows));
     data->uniforms.extra.y = picture.shadow.empty() ? 0.0f : 1.0f;
     data->uniforms.forward.w = 1;
+    const auto unused = std::ranges::find_if(all_prepared_, [](const auto& one) { return one.use_count() == 1; });
+    prepared_ = unused != all_prepared_.end() ? *unused : all_prepared_.emplace_back(std::make_shared<Prepared>(gpu_));
+    Prepared& next = *prepared_;
     next.data = std::move(*data);
     upload_frame(next.data, picture, next.inputs);
     next.strip = {picture.width, 0, picture.height};
@@ -172,11 +171,10 @@ bool DeviceRain::prepare(const RainFrame& rain, const Weather& weather, const Pi
 }
 
 DeviceRain::Recording DeviceRain::prepared(const GpuImage& shadow_map) {
-    const Prepared& what = *prepared_[next_prepared_];
-    if (what.strip.rows == 0) return {};
-    return [this, &what, &shadow_map](const vk::raii::CommandBuffer& commands, DescriptorSets& sets,
-                                      const GpuBuffer& pixels, const GpuBuffer& depths) {
-        record_passes({commands, sets, shadow_map, pixels, depths}, what.data, what.inputs, what.strip);
+    if (prepared_ == nullptr) return {};
+    return [this, what = prepared_, &shadow_map](const vk::raii::CommandBuffer& commands, DescriptorSets& sets,
+                                                 const GpuBuffer& pixels, const GpuBuffer& depths) {
+        record_passes({commands, sets, shadow_map, pixels, depths}, what->data, what->inputs, what->strip);
     };
 }
 

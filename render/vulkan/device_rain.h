@@ -45,8 +45,8 @@ class DeviceRain {
     // Prepares the rain over a picture that the view is about to draw; what it reads of `picture` is its light. Returns as
     // begin(). Afterwards prepared() records it, or is empty where nothing falls in view.
     bool prepare(const RainFrame& rain, const Weather& weather, const Picture& picture);
-    // Records the prepared rain, with the shadow map of the picture; may be called again while the picture is in flight, of
-    // which no more than two may be. `pixels`, `depths`: as BinnedView has them. Needs barriers before and behind.
+    // Records the prepared rain, with the shadow map of the picture; may be called again as long as the
+    // recording is kept, which must be while the picture is in flight. `pixels`, `depths`: as BinnedView has them. Needs barriers before and behind.
     using Recording = std::function<void(const vk::raii::CommandBuffer& commands, DescriptorSets& sets,
                                          const GpuBuffer& pixels, const GpuBuffer& depths)>;
     Recording prepared(const GpuImage& shadow_map);
@@ -108,8 +108,8 @@ class DeviceRain {
     } made_;
     std::vector<std::unique_ptr<Slot>> slots_;
     std::size_t next_ = 0;
-    std::vector<std::unique_ptr<Prepared>> prepared_;
-    std::size_t next_prepared_ = 0;
+    std::vector<std::shared_ptr<Prepared>> all_prepared_;  // recordings keep what they read
+    std::shared_ptr<Prepared> prepared_;                   // of the next picture
 };
 
 }  // namespace nephos

@@ -128,6 +128,7 @@ void VulkanBackend::use_mirror(const FrameDescription& frame, const Picture& pic
 }
 
 bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
+    kept_ = nullptr;  // of one that could not be begun
     check_limits(frame);
     LitCloud& cloud = frame.cloud;
     ViewSortedSplats billboards;
@@ -214,11 +215,10 @@ bool VulkanBackend::begin_rain(const RainFrame& frame, const Weather& weather, c
 }
 
 void VulkanBackend::finish(Picture& picture) {
+    const bool keeps = kept_ == &picture;
+    if (keeps) kept_ = nullptr;
     if (view_) view_->finish(picture);
-    if (kept_ == &picture) {
-        kept_ = nullptr;
-        view().keep_mirror();
-    }
+    if (keeps) view().keep_mirror();
     if (rain_) rain_->finish(picture);
 }
 

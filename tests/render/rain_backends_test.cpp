@@ -15,6 +15,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/error.h"
 #include "render/renderer.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/rain_scene.h"
@@ -349,6 +350,30 @@ TEST_F(RainBackends, AreThereWhereListsWereTooShort) {
     EXPECT_EQ(RendererTestAccess::rains_on_device(vulkan_), 1u);
     EXPECT_LE(apart(picture, expected), picture.beauty.size() / 1000);
     test::expect_same_bits(draw_in(vulkan_), picture);
+}
+
+// One that cannot be drawn, between pictures in flight of which the first is recorded again.
+TEST_F(RainBackends, BadPicturesLeaveTheRainOfOthers) {
+    RainView view = views()[0], other = view, bad = view;
+    other.time_s = view.time_s + 3;
+    bad.options.camera.position_m.x = 2e15;
+    const std::vector<Metaball> around = test::ragged_cloud({{-380, 500, 5}, 40, 24, 24, 16});
+    Splats splats = splats_of(view);
+    splats.metaballs = {around, 1e-4, test::kVoxelNormalisation};
+    const auto begin = [&](Renderer& renderer, RainView& of) {
+        of.options.camera.width = 240;
+        of.options.camera.height = 176;
+        return renderer.begin(splats, at_time(of), {}, Rainfall{of.options, of.weather, of.time_s});
+    };
+    Renderer alone(test::validated(Splatting::vulkan));
+    const Picture expected = alone.finish(begin(alone, view)), expected_other = alone.finish(begin(alone, other));
+    PendingPicture first = begin(vulkan_, view), second = begin(vulkan_, other);
+    EXPECT_THROW(begin(vulkan_, bad), Error);
+    PendingPicture third = begin(vulkan_, other);
+    test::expect_same_bits(vulkan_.finish(std::move(first)), expected);
+    test::expect_same_bits(vulkan_.finish(std::move(second)), expected_other);
+    test::expect_same_bits(vulkan_.finish(std::move(third)), expected_other);
+    EXPECT_GT(RendererTestAccess::overflows(vulkan_), 0u);
 }
 
 // More curtains than shaders know: the processor draws them.
