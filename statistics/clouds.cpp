@@ -18,7 +18,7 @@ constexpr std::uint32_t kNone = ~std::uint32_t(0);
 // Union-find over runs: `roots` of a root is itself and the smallest of its set.
 class Sets {
   public:
-    explicit Sets(std::size_t count) : roots_(count), joined_(count, 0) { std::iota(roots_.begin(), roots_.end(), 0u); }
+    explicit Sets(std::size_t count) : roots_(count) { std::iota(roots_.begin(), roots_.end(), 0u); }
     std::uint32_t root(std::uint32_t n) {
         while (roots_[n] != n) n = roots_[n] = roots_[roots_[n]];
         return n;
@@ -32,10 +32,7 @@ class Sets {
         }
         const std::uint32_t first = std::min(one, other);
         roots_[a] = roots_[b] = roots_[one] = roots_[other] = first;
-        joined_[a] = joined_[b] = 1;
     }
-    // Returns true where a member is alone in its set, and was never united, not even with itself.
-    bool is_single(std::uint32_t n) const { return joined_[n] == 0; }
     // Numbers the sets in the order of their first members, and returns how many there are.
     std::uint32_t number(std::vector<std::uint32_t>& numbers) const {
         numbers.resize(roots_.size());
@@ -48,7 +45,6 @@ class Sets {
 
   private:
     std::vector<std::uint32_t> roots_;
-    std::vector<std::uint8_t> joined_;
 };
 
 // The sum of positions along an axis; on a periodic one of their directions around the circle.
@@ -118,13 +114,15 @@ bool is_periodic(Boundary boundary) { return boundary == Boundary::periodic; }
 // One labelling of a plane of one or several levels.
 class Labelling {
   public:
-    Labelling(const BitPlaneView& plane, const Boundaries& boundaries, Neighbours neighbours)
+    // Without faces the clouds have no edges.
+    Labelling(const BitPlaneView& plane, const Boundaries& boundaries, Neighbours neighbours,
+              bool with_faces = true)
         : plane_(plane), boundaries_(boundaries), numbers_(number_runs(plane)), sets_(numbers_.count()) {
         has_levels_ = plane.extent.z > 1;
         open_sides_ = (is_periodic(boundaries.x) ? 0 : kLowX | kHighX) |
                       (is_periodic(boundaries.y) ? 0 : kLowY | kHighY) |
                       (is_periodic(boundaries.z) || !has_levels_ ? 0 : kLowZ | kHighZ);
-        shared_.resize(numbers_.count());
+        if (with_faces) shared_.resize(numbers_.count());
         join_around_x();
         const Extent& e = plane.extent;
         for (int k = 0; k < e.z; ++k) {
@@ -157,7 +155,7 @@ class Labelling {
         for (std::size_t row = 0; row + 1 < numbers_.rows.size(); ++row) {
             if (!covers(row, 0) || !covers(row, plane_.extent.x - 1)) continue;
             sets_.unite(first(row), last(row) - 1);
-            shared_[first(row)] += 2;
+            if (!shared_.empty()) shared_[first(row)] += 2;
         }
     }
 
@@ -178,10 +176,9 @@ class Labelling {
         const std::span<const RunOverlap> overlaps =
             finder_.find({plane_, numbers_, std::size_t(one)}, {plane_, numbers_, std::size_t(other)}, count,
                          shift, boundaries_.x);
-        for (const RunOverlap& overlap : overlaps) {
-            sets_.unite(overlap.one, overlap.other);
-            if (shift == 0) shared_[overlap.one] += 2 * overlap.cells;
-        }
+        for (const RunOverlap& overlap : overlaps) sets_.unite(overlap.one, overlap.other);
+        if (shift != 0 || shared_.empty()) return;
+        for (const RunOverlap& overlap : overlaps) shared_[overlap.one] += 2 * overlap.cells;
     }
 
     // Sides of the box that the cells of a row lie at, but for those of x.
@@ -210,7 +207,7 @@ class Labelling {
     OverlapFinder finder_;
     bool has_levels_;
     unsigned open_sides_;
-    std::vector<int> shared_;           // of each run: faces towards other cells, those of both sides counted
+    std::vector<int> shared_;           // of each run, or empty: faces towards other cells, those of both sides counted
     std::vector<std::uint32_t> cloud_;  // of each run
     std::uint32_t clouds_ = 0;
 };
@@ -273,7 +270,12 @@ std::vector<ConnectedCloud> Labelling::clouds(bool with_centroids) const {
     std::vector<std::uint8_t> sides;
     sides.reserve(clouds_);
     std::optional<Centroids> centroids;
-    if (with_centroids) centroids.emplace(e, boundaries_, clouds_);
+    std::vector<std::uint32_t> runs_of_cloud;
+    if (with_centroids) {
+        centroids.emplace(e, boundaries_, clouds_);
+        runs_of_cloud.resize(clouds_);
+        for (const std::uint32_t number : cloud_) ++runs_of_cloud[number];
+    }
     const int open_x = (open_sides_ & kLowX) != 0;
     std::size_t row = 0;
     for (int k = 0; k < e.z; ++k) {
@@ -297,7 +299,7 @@ std::vector<ConnectedCloud> Labelling::clouds(bool with_centroids) const {
                 sides[number] = std::uint8_t(sides[number] | row_sides | (at_west ? kLowX : 0) |
                                              (at_east ? kHighX : 0));
                 if (!centroids) continue;
-                if (cells == 1 && sets_.is_single(n)) {
+                if (cells == 1 && runs_of_cloud[number] == 1) {
                     centroids->put_cell(cloud, run.begin, j, k);
                 } else {
                     centroids->add(number, run, j, k);
@@ -339,7 +341,7 @@ std::vector<ConnectedCloud> clouds_3d(const BitPlaneView& cld, const Boundaries&
 
 LabelledClouds labelled_clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries) {
     BitPlane shadow = shadow_of(cld);
-    Labelling labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, Neighbours::four);
+    Labelling labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, Neighbours::four, false);
     return std::move(labelling).labelled(std::move(shadow));
 }
 
