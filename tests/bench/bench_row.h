@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,12 +34,30 @@ double time_ms(F&& work) {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
+// Processor time of the calling thread: other work of the machine hardly changes it.
+template <class F>
+double processor_time_ms(F&& work) {
+    const auto now_ms = [] {
+        timespec now{};
+        ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+        return double(now.tv_sec) * 1e3 + double(now.tv_nsec) * 1e-6;
+    };
+    const double start = now_ms();
+    work();
+    return now_ms() - start;
+}
+
+enum class Clock { wall, processor };
+
 // Runs both sides `rounds` times in turn after one round that does not count; medians in ms (first, second).
 template <class F, class G>
-std::pair<double, double> interleave(int rounds, F&& ours, G&& other) {
+std::pair<double, double> interleave(int rounds, F&& ours, G&& other, Clock clock = Clock::wall) {
     std::vector<double> a, b;
+    const auto time_of = [clock](auto&& work) {
+        return clock == Clock::wall ? time_ms(work) : processor_time_ms(work);
+    };
     for (int round = -1; round < rounds; ++round) {
-        const double first = time_ms(ours), second = time_ms(other);
+        const double first = time_of(ours), second = time_of(other);
         if (round < 0) continue;
         a.push_back(first);
         b.push_back(second);

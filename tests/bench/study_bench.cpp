@@ -42,7 +42,8 @@ BenchRow sweep_row(int clouds_every, const std::string& what, const std::string&
     options.clouds_every = clouds_every;
     options.tracks = tracks;
     const auto [ours, other] = interleave(
-        kRounds, [&] { run_for_statistics(scene, options); }, [&] { step_alone(scene); });
+        kRounds, [&] { run_for_statistics(scene, options); }, [&] { step_alone(scene); },
+        Clock::processor);
     return {"a run of a sweep, 256x128x20 x 300 steps, " + what + ", against its steps alone", ours, other,
             target, ""};
 }
@@ -68,7 +69,7 @@ BenchRow statistics_only_row() {
                 kept += a.hash().low;
             });
         },
-        [&] { each_step([&](const Automaton& a) { kept += a.hash().low; }); });
+        [&] { each_step([&](const Automaton& a) { kept += a.hash().low; }); }, Clock::processor);
     return {"statistics of every step and its hash, 256x128x20 x 300 steps, against the hash alone", ours,
             other, "<= 1.1x", kept == 0 ? "nothing was measured" : ""};
 }
@@ -88,7 +89,7 @@ BenchRow series_row() {
             series = pack_series(run.series, run.scales).size();
             record = record_line(planned, run, 0, series).size();
         },
-        [&] { step_alone(scene); });
+        [&] { step_alone(scene); }, Clock::processor);
     // The tables keep the series once more, as they are.
     const std::size_t all = series + record + run.series.size() * sizeof(float);
     return {"storing a run of 300 steps, against its steps alone", ours, other, "<= 0.05x",
@@ -111,7 +112,8 @@ BenchRow state_row(const std::string& what, const std::string& target, Measure&&
         },
         [&] {
             for (int n = 0; n < kRepeat; ++n) other.step();
-        });
+        },
+        Clock::processor);
     return {what + " of a state of 256x128x20, against a step", ours / kRepeat, theirs / kRepeat, target, ""};
 }
 
