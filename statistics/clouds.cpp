@@ -265,10 +265,8 @@ class Centroids {
 std::vector<ConnectedCloud> Labelling::clouds(bool with_centroids) const {
     const Extent& e = plane_.extent;
     const std::vector<CellRun> runs = runs_of(plane_, numbers_);
-    std::vector<ConnectedCloud> clouds;
-    clouds.reserve(clouds_);
-    std::vector<std::uint8_t> sides;
-    sides.reserve(clouds_);
+    std::vector<ConnectedCloud> clouds(clouds_);
+    std::vector<std::uint8_t> sides(clouds_, 0);
     std::optional<Centroids> centroids;
     std::vector<std::uint32_t> runs_of_cloud;
     if (with_centroids) {
@@ -285,11 +283,9 @@ std::vector<ConnectedCloud> Labelling::clouds(bool with_centroids) const {
             for (std::uint32_t n = first(row); n < last(row); ++n) {
                 const CellRun run = runs[n];
                 const std::uint32_t number = cloud_[n];
-                if (number == clouds.size()) {  // the first run of its cloud
-                    clouds.push_back({.lowest = k});
-                    sides.push_back(0);
-                }
                 ConnectedCloud& cloud = clouds[number];
+                // The first run of a cloud or not: nobody can foretell it, so no branch.
+                cloud.lowest = cloud.cells == 0 ? k : cloud.lowest;
                 const int at_west = run.begin == 0, at_east = run.end == e.x, cells = run.end - run.begin;
                 // Those between two runs are taken off one of the two: of the cloud all are.
                 cloud.cells += std::uint64_t(cells);

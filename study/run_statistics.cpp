@@ -77,7 +77,8 @@ class Measurement {
     std::uint64_t steps() const { return series_[0].size() - 1; }
     Judgement judged() const { return judge(series_[0], activation_ > 0 || series_[2].back() > 0); }
     SeriesMean mean(std::size_t statistic, const Judgement& judgement) const;
-    RunResult result(const Judgement& judgement) const;
+    RunResult result(const Judgement& judgement) const;  // without its thumbnail
+    std::string thumbnail() const { return thumbnail_of(automaton().cld()); }
 
   private:
     // How far the step that follows moves the bits of each level: they lie at the floor of the way of the air.
@@ -245,7 +246,6 @@ RunResult Measurement::result(const Judgement& judgement) const {
     for (const std::vector<double>& series : series_)
         for (const double value : series) result.series.push_back(float(value));
     result.scales = series_scales(lattice_.extent, lattice_.placement);
-    result.thumbnail = thumbnail_of(automaton().cld());
     return result;
 }
 
@@ -264,7 +264,7 @@ std::size_t statistic_index(std::string_view name) {
                             fmt::join(names, ", ")));
 }
 
-RunResult run_for_statistics(const Scene& scene, const SweepOptions& options) {
+RunResult run_for_statistics(const Scene& scene, const SweepOptions& options, bool with_thumbnail) {
     const StepRules& rules = options.steps;
     Measurement measurement(scene, options);
     std::uint64_t steps = rules.min;
@@ -277,7 +277,11 @@ RunResult run_for_statistics(const Scene& scene, const SweepOptions& options) {
     while (true) {
         while (measurement.steps() < steps) measurement.step();
         const Judgement judgement = measurement.judged();
-        if (steps >= rules.max || is_exact(judgement)) return measurement.result(judgement);
+        if (steps >= rules.max || is_exact(judgement)) {
+            RunResult result = measurement.result(judgement);
+            if (with_thumbnail) result.thumbnail = measurement.thumbnail();
+            return result;
+        }
         steps = std::min(rules.max, steps + steps / 2);
     }
 }

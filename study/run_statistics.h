@@ -100,6 +100,6 @@ struct RunResult {
 
 // Runs the scene from its start by the rules of `options`, which has its `layer` set where the scene has layers. Throws as
 // LayerSimulation. The result does not depend on the number of threads.
-RunResult run_for_statistics(const Scene& scene, const SweepOptions& options);
+RunResult run_for_statistics(const Scene& scene, const SweepOptions& options, bool with_thumbnail = true);
 
 }  // namespace nephos

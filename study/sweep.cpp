@@ -178,9 +178,7 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
     };
     const Task task = [&](std::uint64_t number) {
         const PlannedRun run = plan.run(number);
-        RunResult result = run_for_statistics(plan.scene_of(run), plan.options());
-        if (run.replicate != 0) result.thumbnail.clear();
-        return packed(result);
+        return packed(run_for_statistics(plan.scene_of(run), plan.options(), run.replicate == 0));
     };
     const TaskEnd end = [&](std::uint64_t number, const std::string& result,
                             const std::optional<std::string>& failure) {

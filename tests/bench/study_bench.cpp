@@ -42,7 +42,7 @@ BenchRow sweep_row(int clouds_every, const std::string& what, const std::string&
     options.clouds_every = clouds_every;
     options.tracks = tracks;
     const auto [ours, other] = interleave(
-        kRounds, [&] { run_for_statistics(scene, options); }, [&] { step_alone(scene); },
+        kRounds, [&] { run_for_statistics(scene, options, false); }, [&] { step_alone(scene); },
         Clock::processor);
     return {"a run of a sweep, 256x128x20 x 300 steps, " + what + ", against its steps alone", ours, other,
             target, ""};
@@ -79,8 +79,7 @@ BenchRow series_row() {
     const Scene scene = fair_scene();
     SweepOptions options;
     options.steps = {kSteps, kSteps, {}};
-    RunResult run = run_for_statistics(scene, options);
-    run.thumbnail.clear();  // of a point one run keeps it
+    const RunResult run = run_for_statistics(scene, options, false);  // of a point one run has a thumbnail
     const PlannedRun planned{std::string(32, '0'), 0, 0, 0, 1, {"0.12"}};
     std::size_t series = 0, record = 0;
     const auto [ours, other] = interleave(
