@@ -145,30 +145,41 @@ struct InTiles {
 };
 
 // Adds the drift of bands at heights `z`; `used`: lanes that count.
-HWY_INLINE void add_drift(const ErosionConstants& e, Floats z, Mask used, InTiles& at) {
+HWY_INLINE void add_drift(const DetailKernel& field, Floats z, Mask used, InTiles& at) {
     const Lanes d;
     const IntLanes di;
+    const ErosionConstants& e = *field.erosion;
     const Floats place = hn::MulAdd(hn::Sub(z, number(e.bands_begin_m)), number(e.bands_per_m), number(-0.5f));
     const Floats last = number(float(e.bands.size() - 1));
     const Floats below = hn::Min(hn::Max(hn::Floor(place), hn::Zero(d)), last),
                  above = hn::Min(hn::Add(below, number(1.0f)), last);
     at.share = text::share_of_upper(hn::Sub(place, below));
     const Mask passed = hn::Ge(at.share, number(1.0f));
-    const auto first_of = [&](Floats band) { return hn::ShiftLeft<2>(hn::ConvertTo(di, band)); };
-    const Ints own = first_of(hn::IfThenElse(passed, above, below)), next = first_of(above);
-    const float* const words = e.bands.front().data();
-    const auto of = [&](Ints band, int n) { return hn::GatherIndex(d, words + n, band); };
-    at.apart = of(first_of(below), 3);
+    const Floats own = hn::IfThenElse(passed, above, below);
     at.share = hn::IfThenElseZero(hn::Lt(at.share, number(1.0f)), at.share);
     at.two = !hn::AllFalse(d, hn::And(used, hn::Gt(at.share, hn::Zero(d))));
-    if (at.two) {
-        at.next_u = hn::Add(at.u, of(next, 0));
-        at.next_v = hn::Add(at.v, of(next, 1));
-        at.next_w = hn::Add(at.w, of(next, 2));
+    const auto add = [&](const auto& of) {  // of(band, n): number n of bands
+        at.apart = of(below, 3);
+        if (at.two) {  // lanes with one band alone read what is in the cache
+            const Mask both = hn::And(used, hn::Gt(at.share, hn::Zero(d)));
+            at.next_u = hn::IfThenElseZero(both, hn::Add(at.u, of(above, 0)));
+            at.next_v = hn::IfThenElseZero(both, hn::Add(at.v, of(above, 1)));
+            at.next_w = hn::IfThenElseZero(both, hn::Add(at.w, of(above, 2)));
+        }
+        at.u = hn::Add(at.u, of(own, 0));
+        at.v = hn::Add(at.v, of(own, 1));
+        at.w = hn::Add(at.w, of(own, 2));
+    };
+    if (e.bands.size() <= hn::Lanes(d)) {  // they fit into a vector
+        add([&](Floats band, std::size_t n) {
+            return hn::TableLookupLanes(hn::LoadU(d, field.bands[n].data()),
+                                        hn::IndicesFromVec(d, hn::ConvertTo(di, band)));
+        });
+    } else {
+        add([&](Floats band, std::size_t n) {
+            return hn::GatherIndex(d, e.bands.front().data() + n, hn::ShiftLeft<2>(hn::ConvertTo(di, band)));
+        });
     }
-    at.u = hn::Add(at.u, of(own, 0));
-    at.v = hn::Add(at.v, of(own, 1));
-    at.w = hn::Add(at.w, of(own, 2));
 }
 
 // Returns look_up(u, v, w), a noise that is uniform, where it passes from one band into the next that of both.
@@ -185,8 +196,9 @@ struct Eroded {
 };
 
 // The detailed density of nodes at places relative to the field's corner, metres. Lanes that are not `asked` are 0. No
-// lane depends on the others; without kMargins the margins are of no use, and lanes that are cloud or clear whatever the
-// noise do not look it up: they read its first voxel, which is in the cache.
+// lane depends on the others. Lanes without need of the noise do not look it up: they read a voxel that is in the cache. Those
+// are the ones not asked for and, without kMargins, where margins are of no use, also those that are cloud or clear
+// whatever the noise.
 template <bool kMargins = false>
 HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, Floats y, Floats z, Floats footprint,
                          Mask asked) {
@@ -210,20 +222,20 @@ HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, 
     };
     InTiles at{turned(0), turned(1), turned(2), zero, zero, zero, zero, zero};
     const Floats edge = number(float(kLargeNoiseVoxels));
-    Mask unsure = needed;
+    Mask unsure = asked;
     if (!kMargins) {
         const Floats most = hn::MulAdd(half, large, hn::Add(number(0.5001f), others));
         unsure = hn::And(needed, hn::Lt(c, most));
-        at.u = hn::IfThenElseZero(unsure, at.u);
-        at.v = hn::IfThenElseZero(unsure, at.v);
-        at.w = hn::IfThenElseZero(unsure, at.w);
     }
-    if (!e.bands.empty()) add_drift(e, z, kMargins ? asked : unsure, at);
+    at.u = hn::IfThenElseZero(unsure, at.u);
+    at.v = hn::IfThenElseZero(unsure, at.v);
+    at.w = hn::IfThenElseZero(unsure, at.w);
+    if (!e.bands.empty()) add_drift(field, z, unsure, at);
     Floats noise = of_bands(at, at.apart, [&](Floats u, Floats v, Floats w) {
         return noise_at(field.large_noise, integer(0), integer(7), hn::Mul(u, edge), hn::Mul(v, edge), hn::Mul(w, edge));
     });
     noise = hn::MulAdd(large, hn::Sub(noise, half), half);
-    const Mask near = hn::And(unsure, hn::Lt(hn::Abs(hn::Sub(c, noise)), others));
+    const Mask near = hn::And(hn::And(needed, unsure), hn::Lt(hn::Abs(hn::Sub(c, noise)), others));
     if (!hn::AllFalse(d, hn::And(near, hn::Gt(medium, zero)))) {
         const auto level_of = [&](float voxels_per_m) {
             const Floats voxels = hn::Max(hn::Mul(footprint, number(voxels_per_m)), number(1.0f));

@@ -183,7 +183,10 @@ DetailKernel::DetailKernel(const CoverageField& field)
       bricks(field.bricks()),
       node_m(float(field.node_m())),
       extinction_per_m(float(field.extinction_per_m())),
-      corner_m{field.corner_m().x, field.corner_m().y, field.corner_m().z} {}
+      corner_m{field.corner_m().x, field.corner_m().y, field.corner_m().z} {
+    for (std::size_t band = 0; band < std::min(kBands, erosion->bands.size()); ++band)
+        for (std::size_t n = 0; n < bands.size(); ++n) bands[n][band] = erosion->bands[band][n];
+}
 
 std::size_t CoverageField::memory_bytes() const {
     return nodes_.size() + clearance_.size() + 4 * cell_density_.size() + 4 * (table_.size() + places_.size());

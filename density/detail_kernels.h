@@ -23,6 +23,9 @@ struct DetailKernel {
     const std::uint32_t *large_noise = nullptr, *small_noise = nullptr;
     const ErosionConstants* erosion = nullptr;
     std::array<int, 3> bricks{};
+    // The first of ErosionConstants::bands, one number of all of them after the other: as many as fit into a vector.
+    static constexpr std::size_t kBands = 16;
+    std::array<std::array<float, kBands>, 4> bands{};
     float node_m = 1, extinction_per_m = 0;
     std::array<double, 3> corner_m{};
 

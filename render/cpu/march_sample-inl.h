@@ -82,6 +82,14 @@ HWY_INLINE BoxPart part_in_box(const MarchedVolume& volume, const Floats3& ray, 
     return part;
 }
 
+// The part in which a volume is marched.
+HWY_INLINE BoxPart part_of(const MarchedScene& march, const MarchedVolume& volume, const Floats3& ray,
+                           const Floats3& per_ray) {
+    BoxPart part = part_in_box(volume, ray, per_ray);
+    if (!volume.repeats) part.end = hn::Min(part.end, set(march.fade_ends));
+    return part;
+}
+
 HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& ray, const Floats3& per_ray,
                                       const BoxPart* parts, Floats distance, Floats transmittance, Mask active) {
     const Lanes d;
@@ -152,7 +160,8 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
         const Floats beyond = set(volume.repeats ? shader::kBeyondBentFace_m : shader::kBeyondFace_m);
         step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), beyond), step);
         if (!hn::AllFalse(d, sampled)) {
-            const auto number = hn::Max(place.number, hn::Zero(di));
+            // The other lanes read the first brick, which is in the cache.
+            const auto number = hn::IfThenElseZero(hn::RebindMask(di, sampled), place.number);
             erosion::Node node =
                 erosion::node_at(volume.kernel, number, place.local.x, place.local.y, place.local.z);
             if (volume.repeats) node.t = scaled_share(node.t, patches_at(volume, in_volume));

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/frame/marched_scene.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <string>
 
 #include "core/error.h"
@@ -77,14 +80,21 @@ MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& c
         most_step = std::min(most_step, shader::kMostStepNodes * volume.kernel.node_m);
     }
     per_unit = float(1 / pixels_per_unit);
-    // With detail a twentieth of a cell; without, half of one, the distance between two nodes.
+    // With detail a fortieth of a cell; without, half of one, the distance between two nodes.
     double least_m = double(shader::kLeastStep_m);
     for (const CloudVolume& volume : of)
-        least_m = std::min(least_m, volume.field.node_m() * (volume.field.erosion().whole > 0 ? 1 : 0.1));
+        least_m = std::min(least_m, volume.field.node_m() * (volume.field.erosion().whole > 0 ? 1 : 0.05));
     least_step = float(least_m);
     const auto scale = float(footprint_scale(of));
     fade_begins = scale * shader::kMarchedFootprint_m / per_unit;
     fade_ends = scale * shader::kSplattedFootprint_m / per_unit;
+}
+
+void MarchState::find_next(const float* transmittance) {
+    next = std::numeric_limits<float>::max();
+    for (std::size_t n = 0; n < kPixels; ++n)
+        if (distance[n] < end[n] && transmittance[n] > shader::kMarchOpaque) next = std::min(next, distance[n]);
+    done = next == std::numeric_limits<float>::max();
 }
 
 }  // namespace nephos

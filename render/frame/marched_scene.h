@@ -60,8 +60,12 @@ struct MarchState {
     alignas(64) float extinction[kPixels] = {};  // of the last
     alignas(64) float step[kPixels] = {};        // from the last to the next
     alignas(64) float margin[kPixels];           // of the last; below 0: no sample, empty space was skipped
-    alignas(64) float weight[kPixels] = {}, weighted_distance[kPixels] = {};  // seen, but not shaded yet
+    alignas(64) float end[kPixels];              // distance at which the ray ends
+    float next = 0;                              // the least distance of a next sample
     bool begun = false, done = false;
+
+    // Sets `next` and `done`, given the kPixels fractions of the light behind them that rays leave.
+    void find_next(const float* transmittance);
 };
 
 }  // namespace nephos

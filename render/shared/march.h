@@ -13,10 +13,10 @@ namespace nephos::shader {
 NEPHOS_CONST uint kMostVolumes = 16u;                 // in a picture
 NEPHOS_CONST float kEventOpacity = 0.12f;             // of a point that is shaded
 NEPHOS_CONST float kLeavingOpacity = 0.004f;          // of one where the ray leaves cloud
-NEPHOS_CONST float kMarchOpaque = 1.0f / 256.0f;      // transmittance at which a ray ends
-NEPHOS_CONST float kLeastStep_m = 2.0f;               // in cloud of cells of 40 m and more,
-NEPHOS_CONST float kStepPixels = 1.2f;                // ... or this many footprints of a pixel
-NEPHOS_CONST float kMostStepNodes = 4.0f;             // ... in a cloud that repeats at most this many half cells
+NEPHOS_CONST float kMarchOpaque = 1.0f / 64.0f;       // transmittance at which a ray ends
+NEPHOS_CONST float kLeastStep_m = 1.0f;               // in cloud of cells of 40 m and more,
+NEPHOS_CONST float kStepPixels = 0.6f;                // ... or this many footprints of a pixel
+NEPHOS_CONST float kMostStepNodes = 2.0f;             // ... in a cloud that repeats at most this many half cells
 NEPHOS_CONST float kStepGrowth = 4.0f;                // of steps behind opaque cloud
 NEPHOS_CONST float kLongestStep_m = 30.0f;            // near cloud
 NEPHOS_CONST float kBeyondFace_m = 0.01f;             // where a ray goes on behind the face of a cell or a box
