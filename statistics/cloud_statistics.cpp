@@ -40,19 +40,6 @@ std::uint64_t count_bits_of(const std::uint64_t* words, std::size_t count) {
     return total;
 }
 
-// Returns the number of bits that are 1 in a and 0 in b.
-std::uint64_t count_and_not_of(const std::uint64_t* a, const std::uint64_t* b, std::size_t count) {
-    const hn::ScalableTag<std::uint64_t> d;
-    const std::size_t lanes = hn::Lanes(d);
-    auto sums = hn::Zero(d);
-    std::size_t n = 0;
-    for (; n + lanes <= count; n += lanes)
-        sums = hn::Add(sums, hn::PopulationCount(hn::AndNot(hn::LoadU(d, b + n), hn::LoadU(d, a + n))));
-    std::uint64_t total = hn::GetLane(hn::SumOfLanes(d, sums));
-    for (; n < count; ++n) total += hwy::PopCount(a[n] & ~b[n]);
-    return total;
-}
-
 // Returns the number of bits that are 1 in a and 0 in b, and copies b to a.
 std::uint64_t count_and_replace_of(std::uint64_t* a, const std::uint64_t* b, std::size_t count) {
     const hn::ScalableTag<std::uint64_t> d;
@@ -115,7 +102,6 @@ namespace nephos {
 namespace {
 
 HWY_EXPORT(count_bits_of);
-HWY_EXPORT(count_and_not_of);
 HWY_EXPORT(count_and_replace_of);
 HWY_EXPORT(add_level_to);
 HWY_EXPORT(count_and_add_level_to);
@@ -167,11 +153,6 @@ double face_m(CloudLimit limit, std::size_t level, const Placement& placement) {
 }  // namespace
 
 std::uint64_t count_cells(const BitPlaneView& plane) { return count_bits(plane.words, plane.word_count()); }
-
-std::uint64_t count_deaths(const BitPlaneView& before, const BitPlaneView& after) {
-    require_one_extent(before, after);
-    return HWY_DYNAMIC_DISPATCH(count_and_not_of)(before.words, after.words, before.word_count());
-}
 
 std::uint64_t count_deaths_and_replace(BitPlane& before, const BitPlaneView& after) {
     require_one_extent(before.view(), after);

@@ -37,13 +37,10 @@ CloudCounts count_cloud(const BitPlaneView& cld, const Boundaries& boundaries);
 // Returns the number of bits that are 1.
 std::uint64_t count_cells(const BitPlaneView& plane);
 
-// Returns the number of cells that are 1 before and 0 after: with one step between, the cells of cloud that died. The
-// mean lifetime of a cell in steps is the sum of cloud cells over the sum of deaths (Little's law), without any tracking,
-// where no cell enters or leaves: not across open sides, and without wind. Throws Error(usage) when the planes differ in
-// extent.
-std::uint64_t count_deaths(const BitPlaneView& before, const BitPlaneView& after);
-
-// Returns count_deaths() of two planes, and makes the first one like the second.
+// Returns the number of cells that are 1 before and 0 after, and makes the first plane like the second: with one step
+// between, the cells of cloud that died. The mean lifetime of a cell in steps is the sum of cloud cells over the sum of
+// deaths (Little's law), without any tracking, where no cell enters or leaves: not across open sides, and without wind.
+// Throws Error(usage) when the planes differ in extent.
 std::uint64_t count_deaths_and_replace(BitPlane& before, const BitPlaneView& after);
 
 // Returns the shadow of the cloud, one level of the same rows.

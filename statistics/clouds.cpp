@@ -77,7 +77,8 @@ class Centre {
             std::hypot(sum[0], sum[1]) < 1e-9 * weight)
             return 0;
         const double turn = std::atan2(sum[0], sum[1]) / (2 * std::numbers::pi);
-        return (turn < 0 ? turn + 1 : turn) * cells_;
+        const double at = (turn < 0 ? turn + 1 : turn) * cells_;
+        return at < cells_ ? at : 0;  // a turn just below 0 rounds to a whole one
     }
     // Returns the mean of one cell: most clouds are no more than that.
     double mean_of_cell(int at) {

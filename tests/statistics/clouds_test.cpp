@@ -25,6 +25,29 @@ using Step = std::array<int, 3>;
 constexpr std::array<Step, 6> kFaces{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 constexpr std::array<Step, 4> kCorners{{{1, 1, 0}, {-1, 1, 0}, {1, -1, 0}, {-1, -1, 0}}};
 
+// The mean of positions along an axis, cell by cell; along a periodic one the circular mean, 0 where it has no direction.
+class NaiveMean {
+  public:
+    NaiveMean(int cells, Boundary boundary) : cells_(cells), periodic_(boundary == Boundary::periodic) {}
+    void add(int at) {
+        const double angle = 2 * std::numbers::pi * (at + 0.5) / cells_;
+        ++count_;
+        sum_ += at + 0.5;
+        sine_ += std::sin(angle);
+        cosine_ += std::cos(angle);
+    }
+    double value() const {
+        if (!periodic_) return sum_ / count_;
+        if (std::hypot(sine_, cosine_) < 1e-9 * count_) return 0;
+        return std::atan2(sine_, cosine_) / (2 * std::numbers::pi) * cells_;
+    }
+
+  private:
+    int cells_;
+    bool periodic_;
+    double count_ = 0, sum_ = 0, sine_ = 0, cosine_ = 0;
+};
+
 // The components of a plane by flood fill.
 std::vector<ConnectedCloud> flood_fill(const BitPlane& plane, const Boundaries& b, bool corners) {
     const Extent e = plane.extent();
@@ -37,6 +60,7 @@ std::vector<ConnectedCloud> flood_fill(const BitPlane& plane, const Boundaries& 
         ConnectedCloud cloud;
         cloud.lowest = cloud.highest = k0;
         bool low[3] = {}, high[3] = {};
+        NaiveMean means[3] = {{e.x, b.x}, {e.y, b.y}, {e.z, b.z}};
         std::deque<Step> open{{i0, j0, k0}};
         done[start] = true;
         while (!open.empty()) {
@@ -47,6 +71,7 @@ std::vector<ConnectedCloud> flood_fill(const BitPlane& plane, const Boundaries& 
             cloud.highest = std::max(cloud.highest, k);
             const int at[3] = {i, j, k}, size[3] = {e.x, e.y, e.z};
             for (int axis = 0; axis < 3; ++axis) {
+                means[axis].add(at[axis]);
                 low[axis] |= at[axis] == 0;
                 high[axis] |= at[axis] == size[axis] - 1;
             }
@@ -72,6 +97,9 @@ std::vector<ConnectedCloud> flood_fill(const BitPlane& plane, const Boundaries& 
         cloud.cut = (open_x && (low[0] || high[0])) || (open_y && (low[1] || high[1])) ||
                     (e.z > 1 && b.z == Boundary::open && (low[2] || high[2]));
         cloud.spans = (open_x && low[0] && high[0]) || (open_y && low[1] && high[1]);
+        cloud.x = means[0].value();
+        cloud.y = means[1].value();
+        if (e.z > 1) cloud.z = means[2].value();
         clouds.push_back(cloud);
     }
     return clouds;
@@ -90,6 +118,31 @@ void expect_same(const std::vector<ConnectedCloud>& got, const std::vector<Conne
     }
 }
 
+void expect_near(double got, double expected, int cells, Boundary boundary) {
+    const bool around = boundary == Boundary::periodic;
+    EXPECT_NEAR(around ? std::remainder(got - expected, cells) : got - expected, 0, 1e-6) << got;
+    EXPECT_GE(got, 0);
+    EXPECT_LT(got, cells);
+}
+
+void expect_same_centroids(const std::vector<ConnectedCloud>& got,
+                           const std::vector<ConnectedCloud>& expected, const Extent& e,
+                           const Boundaries& b) {
+    ASSERT_EQ(got.size(), expected.size());
+    for (std::size_t n = 0; n < got.size(); ++n) {
+        SCOPED_TRACE(n);
+        expect_near(got[n].x, expected[n].x, e.x, b.x);
+        expect_near(got[n].y, expected[n].y, e.y, b.y);
+        expect_near(got[n].z, expected[n].z, e.z, b.z);
+    }
+}
+
+void expect_all(const std::vector<ConnectedCloud>& got, const std::vector<ConnectedCloud>& expected,
+                const Extent& e, const Boundaries& b) {
+    expect_same(got, expected);
+    expect_same_centroids(got, expected, e, b);
+}
+
 TEST(Clouds, MatchFloodFill) {
     for (std::uint64_t seed = 1; seed < 80; ++seed) {
         SCOPED_TRACE(seed);
@@ -100,11 +153,14 @@ TEST(Clouds, MatchFloodFill) {
         const double p = 0.1 * double(1 + seed % 7);
         const BitPlane shadow = test::random_cells(flat, p, random),
                        cld = test::random_cells(deep, p / 2, random);
-        expect_same(clouds_2d(shadow.view(), b), flood_fill(shadow, {b.x, b.y, Boundary::open}, false));
-        expect_same(clouds_2d(shadow.view(), b, Neighbours::eight),
-                    flood_fill(shadow, {b.x, b.y, Boundary::open}, true));
-        expect_same(clouds_3d(cld.view(), b), flood_fill(cld, b, false));
-        expect_same(cloud_sizes_2d(shadow.view(), b), clouds_2d(shadow.view(), b));
+        const Boundaries from_above{b.x, b.y, Boundary::open};
+        expect_all(clouds_2d(shadow.view(), b), flood_fill(shadow, from_above, false), flat, from_above);
+        expect_all(clouds_2d(shadow.view(), b, Neighbours::eight), flood_fill(shadow, from_above, true), flat,
+                   from_above);
+        expect_all(clouds_3d(cld.view(), b), flood_fill(cld, b, false), deep, b);
+        const std::vector<ConnectedCloud> sizes = cloud_sizes_2d(shadow.view(), b);
+        expect_same(sizes, clouds_2d(shadow.view(), b));
+        for (const ConnectedCloud& cloud : sizes) EXPECT_TRUE(cloud.x == 0 && cloud.y == 0 && cloud.z == 0);
         // What the shadow's edges sum up to is the perimeter of the state.
         std::uint64_t edges = 0;
         for (const ConnectedCloud& cloud : clouds_2d(shadow.view(), b)) edges += cloud.edges;
@@ -119,6 +175,7 @@ TEST(Clouds, CentroidsGoAroundPeriodicSides) {
         clouds_2d(cld.view(), {Boundary::periodic, Boundary::open, Boundary::open});
     ASSERT_EQ(around.size(), 1u);
     EXPECT_NEAR(std::remainder(around[0].x, 70), 0, 1e-9);
+    EXPECT_LT(around[0].x, 70);
     EXPECT_NEAR(around[0].y, 2.5, 1e-12);
     const std::vector<ConnectedCloud> apart = clouds_2d(cld.view(), {});
     ASSERT_EQ(apart.size(), 2u);
@@ -157,6 +214,67 @@ TEST(CloudSizes, FindAKnownExponent) {
     CloudSizes few(range);
     few.add(std::span(clouds).first(10));
     EXPECT_TRUE(std::isnan(few.likelihood_exponent().value) && std::isnan(few.line_exponent().value));
+}
+
+// The exponent whose mean logarithm is the observed one, by bisection alone over the sums of all areas of the range; NaN
+// where it is not within -19 .. 39.
+Estimate naive_likelihood(const SizeRange& range, std::span<const ConnectedCloud> clouds) {
+    double observed = 0, mean = 0, variance = 0;
+    for (const ConnectedCloud& cloud : clouds)
+        observed += std::log(double(cloud.cells)) / double(clouds.size());
+    double low = -20, high = 40;
+    for (int n = 0; n < 60; ++n) {
+        const double t = (low + high) / 2;
+        double sum = 0, first = 0, second = 0;
+        for (std::uint64_t a = range.first; a <= range.last; ++a) {
+            // Relative to the smallest area, and about the observed logarithm, so that no digits are lost.
+            const double log_a = std::log(double(a)),
+                         weight = std::exp(-t * (log_a - std::log(double(range.first))));
+            sum += weight;
+            first += weight * (log_a - observed);
+            second += weight * (log_a - observed) * (log_a - observed);
+        }
+        mean = first / sum;
+        variance = second / sum - mean * mean;
+        (mean > 0 ? low : high) = t;
+    }
+    if (low < -19 || high > 39) return {std::nan(""), std::nan("")};
+    return {(low + high) / 2, 1 / std::sqrt(double(clouds.size()) * variance)};
+}
+
+TEST(CloudSizes, LikelihoodMatchesPlainBisection) {
+    std::mt19937_64 random(9);
+    int found = 0, steep = 0, rising = 0, none = 0;
+    for (int round = 0; round < 120; ++round) {
+        SCOPED_TRACE(round);
+        // Beyond areas of 1,024 the library integrates.
+        const std::uint64_t first = 1 + random() % 60,
+                            last = first + 1 + random() % (round % 4 == 0 ? 3000 : 900);
+        // From all clouds at the small end of the range to all at its large one.
+        const double power = std::pow(2.0, double(round % 12) - 6);
+        std::vector<ConnectedCloud> clouds(24 + random() % 100);
+        std::uniform_real_distribution<double> unit(0, 1);
+        for (ConnectedCloud& cloud : clouds) {
+            cloud.cells = first + std::uint64_t(std::pow(unit(random), power) * double(last - first) + 0.5);
+            cloud.edges = cloud.cells;
+        }
+        CloudSizes sizes({first, last});
+        sizes.add(clouds);
+        const Estimate got = sizes.likelihood_exponent(), expected = naive_likelihood({first, last}, clouds);
+        ASSERT_EQ(std::isnan(got.value), std::isnan(expected.value)) << got.value << " " << expected.value;
+        if (std::isnan(expected.value)) {
+            EXPECT_TRUE(std::isnan(got.error));
+            ++none;
+            continue;
+        }
+        ++found;
+        steep += expected.value > 5;
+        rising += expected.value < -5;
+        EXPECT_NEAR(got.value, expected.value, 1e-6 * (1 + std::abs(expected.value)));
+        EXPECT_NEAR(got.error, expected.error, 1e-5 * expected.error);
+    }
+    EXPECT_GT(found, 80);
+    EXPECT_TRUE(steep > 0 && rising > 0 && none > 0) << steep << " " << rising << " " << none;
 }
 
 // Clouds that an open side cuts have lost an unknown part: neither estimate may see them.

@@ -59,10 +59,11 @@ TEST(NullScene, StatisticsAreThoseInClosedForm) {
         fraction.push_back(double(counts.cells) / columns / kLevels);
         perimeter += counts.edges;
         if (step > 200) {
-            deaths += count_deaths(before.view(), cld);
             cells += before.count();
+            deaths += count_deaths_and_replace(before, cld);
+        } else {
+            before = copy_of(cld);
         }
-        before = copy_of(cld);
         if (step % 100 != 0) continue;  // independent of each other
         ++snapshots;
         for (const ConnectedCloud& cloud : clouds_2d(cld, automaton.options().boundaries))

@@ -4,8 +4,10 @@
 
 #include "statistics/series.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <random>
 
 #include "statistics/cloud_statistics.h"
@@ -41,6 +43,46 @@ TEST(Series, IntegratedTimeSumsPairsFromLagZero) {
     EXPECT_DOUBLE_EQ(integrated_time(std::vector<double>{1, 0.5, -0.2, 0.1, 0.05, -0.4}), 2);
     EXPECT_DOUBLE_EQ(integrated_time(std::vector<double>{1, 0.5, 0.2, -0.1, 0.1, -0.2}), 2 * (1.5 + 0.1) - 1);
     EXPECT_DOUBLE_EQ(integrated_time(std::vector<double>{1, -0.9, 0.8, -0.7, 0.6, -0.5}), 1);
+}
+
+// Lags are summed up 16 at a time; beyond the series there is nothing to sum.
+TEST(Series, AutocorrelationMatchesSumsOfOneLag) {
+    for (const std::size_t size : {2u, 3u, 15u, 16u, 17u, 18u, 31u, 32u, 33u, 34u, 100u}) {
+        const std::vector<double> series = autoregressive(size, 0.3, 0.7, 0.02, size);
+        const double mean = std::accumulate(series.begin(), series.end(), 0.0) / double(size);
+        const auto sum_at = [&](std::size_t lag) {
+            double sum = 0;
+            for (std::size_t n = 0; n + lag < size; ++n) sum += (series[n] - mean) * (series[n + lag] - mean);
+            return sum;
+        };
+        for (const std::size_t lags : {std::size_t(0), std::size_t(1), std::size_t(15), std::size_t(16),
+                                       std::size_t(17), size - 1, size, size + 20}) {
+            const std::vector<double> rho = autocorrelation(series, lags);
+            ASSERT_EQ(rho.size(), lags + 1);
+            for (std::size_t lag = 0; lag <= lags; ++lag)
+                EXPECT_EQ(rho[lag], lag < size ? sum_at(lag) / sum_at(0) : 0)
+                    << "size " << size << ", lag " << lag << " of " << lags;
+        }
+    }
+}
+
+// The time of a mean ends its lags where their sum ends: it is that of all lags, bit for bit.
+TEST(Series, TimeOfAMeanIsThatOfAllLags) {
+    std::size_t longest = 0;
+    for (const double r : {-0.9, 0.0, 0.5, 0.9, 0.97, 0.999}) {
+        for (const std::size_t size : {2u, 3u, 4u, 30u, 31u, 32u, 33u, 34u, 35u, 66u, 67u, 1000u}) {
+            const std::vector<double> series = autoregressive(size, 0.3, r, 0.02, size);
+            const SeriesMean mean = mean_over(series, {.regime = Regime::steady, .used = size});
+            const std::vector<double> rho = autocorrelation(series, size / 2);
+            EXPECT_EQ(mean.tau, integrated_time(rho)) << "r " << r << ", size " << size;
+            std::size_t pair = 0;
+            while (pair + 1 < rho.size() && rho[pair] + rho[pair + 1] > 0) pair += 2;
+            longest = std::max(longest, pair);
+        }
+    }
+    EXPECT_GT(longest, 48u) << "sums of several blocks of lags";
+    const std::vector<double> constant(40, 0.5);
+    EXPECT_EQ(mean_over(constant, {.regime = Regime::steady, .used = 40}).tau, 1);
 }
 
 // Every tenth step of a pulse of 84 steps: batches of eight values would walk through the pulse and call the beat an error.

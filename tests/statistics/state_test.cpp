@@ -2,8 +2,8 @@
 
 // Counts of a state, overlap and correlation against the same definitions cell by cell.
 
+#include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "statistics/cloud_statistics.h"
 #include "statistics/structure.h"
@@ -101,15 +101,17 @@ TEST(CloudCounts, DeathsAreCellsThatWereAndAreNot) {
     for (std::uint64_t seed = 1; seed < 20; ++seed) {
         std::mt19937_64 random(seed);
         const Extent extent{int(random() % 150) + 1, int(random() % 12) + 1, int(random() % 10) + 1};
-        const BitPlane before = test::random_cells(extent, 0.3, random),
-                       after = test::random_cells(extent, 0.3, random);
+        BitPlane before = test::random_cells(extent, 0.3, random);
+        const BitPlane after = test::random_cells(extent, 0.3, random);
         std::uint64_t deaths = 0;
         for (int k = 0; k < extent.z; ++k)
             for (int j = 0; j < extent.y; ++j)
                 for (int i = 0; i < extent.x; ++i) deaths += before.get(i, j, k) && !after.get(i, j, k);
-        EXPECT_EQ(count_deaths(before.view(), after.view()), deaths) << "seed " << seed;
+        EXPECT_EQ(count_deaths_and_replace(before, after.view()), deaths) << "seed " << seed;
+        EXPECT_TRUE(std::ranges::equal(before.words(), after.words())) << "seed " << seed;
     }
-    EXPECT_THROW(count_deaths(BitPlane({1, 1, 1}).view(), BitPlane({2, 1, 1}).view()), Error);
+    BitPlane other({1, 1, 1});
+    EXPECT_THROW(count_deaths_and_replace(other, BitPlane({2, 1, 1}).view()), Error);
 }
 
 TEST(Structure, OverlapOfTwoLevelsIsItsDefinition) {
@@ -161,6 +163,40 @@ TEST(Structure, CorrelationMatchesCountingPairs) {
     }
     EXPECT_NEAR(correlation_length_m({{1, 0.8}, {2, 0.3}}, 50), 50 * (1 + (0.8 - std::exp(-1)) / 0.5), 1e-9);
     EXPECT_TRUE(std::isnan(correlation_length_m({{1, 0.8}}, 50)));
+}
+
+// Rectangles of `side` columns at random places, so that the correlation falls over that distance.
+BitPlane random_rectangles(const Extent& extent, int side, int count, std::mt19937_64& random) {
+    BitPlane plane(extent);
+    for (int n = 0; n < count; ++n) {
+        const int i0 = int(random() % std::uint64_t(extent.x)), j0 = int(random() % std::uint64_t(extent.y));
+        for (int j = j0; j < std::min(j0 + side, extent.y); ++j)
+            for (int i = i0; i < std::min(i0 + side, extent.x); ++i) plane.set(i, j, 0, true);
+    }
+    return plane;
+}
+
+// Of a shadow rho is computed no farther than 1/e: the length is that of all distances, bit for bit.
+TEST(Structure, CorrelationLengthOfAShadowIsThatOfAllItsDistances) {
+    int far = 0, never = 0;
+    for (std::uint64_t seed = 1; seed < 60; ++seed) {
+        SCOPED_TRACE(seed);
+        std::mt19937_64 random(seed);
+        const Extent extent{int(random() % 140) + 1, int(random() % 60) + 1, 1};
+        const Boundaries boundaries = test::random_boundaries(random);
+        const BitPlane s = random_rectangles(extent, 1 << seed % 6, int(seed % 9), random);
+        const double length = correlation_length_m(s.view(), boundaries, 50),
+                     expected = correlation_length_m(shadow_correlation(s.view(), boundaries), 50);
+        if (std::isnan(expected)) {
+            EXPECT_TRUE(std::isnan(length)) << length;
+            ++never;
+        } else {
+            EXPECT_EQ(length, expected);
+            far += length > 4 * 50;
+        }
+    }
+    EXPECT_GT(far, 5) << "lengths of several distances";
+    EXPECT_GT(never, 5) << "shadows without a length";
 }
 
 }  // namespace
