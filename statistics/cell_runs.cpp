@@ -1,7 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "statistics/cell_runs.h"
 
+#include <string>
+
+#include "core/error.h"
 #include "statistics/row_shift.h"
+
+#ifndef NEPHOS_CELL_RUNS_ONCE
+#define NEPHOS_CELL_RUNS_ONCE
+namespace nephos {
+// Entries behind the last one of a list that list_bits() may write to.
+inline constexpr std::size_t kSpareRuns = 4;
+}  // namespace nephos
+#endif
 
 #ifndef HWY_DISABLED_TARGETS
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
@@ -18,8 +29,6 @@ HWY_BEFORE_NAMESPACE();
 namespace nephos {
 namespace HWY_NAMESPACE {
 
-// Entries behind the last one of a list that list_bits() may write to.
-constexpr std::size_t kSpare = 4;
 constexpr std::uint64_t kLastBit = std::uint64_t(1) << 63;  // for where no bit is left
 
 // Sets `member` of the entries from `to` on to the places of the bits, and returns what follows them. Four at a time, wanted
@@ -28,33 +37,35 @@ template <int CellRun::*member>
 HWY_INLINE CellRun* list_bits(std::uint64_t bits, int at, CellRun* to) {
     CellRun* const end = to + hwy::PopCount(bits);
     do {
-        for (std::size_t n = 0; n < kSpare; ++n, bits &= bits - 1)
+        for (std::size_t n = 0; n < kSpareRuns; ++n, bits &= bits - 1)
             to[n].*member = at + int(hwy::Num0BitsBelowLS1Bit_Nonzero64(bits | kLastBit));
-        to += kSpare;
+        to += kSpareRuns;
     } while (HWY_UNLIKELY(to < end));
     return end;
 }
 
-void number_runs_of(const BitPlaneView& plane, RunNumbers& numbers) {
+// Returns how many runs there are; the numbers are right as far as they fit.
+std::uint64_t number_runs_of(const BitPlaneView& plane, RunNumbers& numbers) {
     const std::uint64_t* words = plane.words;
     std::uint64_t* starts = numbers.starts.data();
     std::uint32_t* before = numbers.before.data();
-    std::uint32_t count = 0;
+    std::uint64_t count = 0;
     for (std::size_t row = 0; row + 1 < numbers.rows.size(); ++row) {
-        numbers.rows[row] = count;
+        numbers.rows[row] = std::uint32_t(count);
         std::uint64_t carry = 0;  // the last cell of the word before
         for (std::size_t w = 0; w < plane.words_per_row; ++w) {
             const std::uint64_t bits = *words++, begins = bits & ~(bits << 1 | carry);
             carry = bits >> 63;
             *starts++ = begins;
-            *before++ = count;
-            count += std::uint32_t(hwy::PopCount(begins));
+            *before++ = std::uint32_t(count);
+            count += hwy::PopCount(begins);
         }
     }
-    numbers.rows.back() = count;
+    numbers.rows.back() = std::uint32_t(count);
+    return count;
 }
 
-// Lists the runs of a row of bits, and returns what follows them. kSpare more entries are written to.
+// Lists the runs of a row of bits, and returns what follows them. kSpareRuns more entries are written to.
 template <class BitsOf>
 HWY_INLINE CellRun* list_runs(std::size_t words, int nx, const BitsOf& bits_of, CellRun* to) {
     CellRun *begins = to, *ends = to;
@@ -98,16 +109,20 @@ const std::uint64_t* moved_row(const std::uint64_t* row, std::size_t words, int 
 }
 
 std::size_t find_overlaps_of(const NumberedRows& one, const NumberedRows& other, std::size_t count, int shift,
-                             bool periodic, std::uint64_t* moved, CellRun* common, RunOverlap* to) {
+                             bool periodic, std::uint64_t* moved, CellRun* common, std::vector<RunOverlap>& overlaps) {
     const std::size_t words = one.plane.words_per_row;
     const int nx = one.plane.extent.x;
-    const RunOverlap* const begin = to;
+    std::size_t found = 0;
     for (std::size_t row = 0; row < count; ++row) {
         const std::size_t word_one = (one.first + row) * words, word_other = (other.first + row) * words;
         const std::uint64_t *a = one.plane.words + word_one, *b = other.plane.words + word_other;
         if (shift != 0) b = moved_row(b, words, nx, shift, periodic, moved);
         const CellRun* const end =
             list_runs(words, nx, [&](std::size_t w) { return a[w] & b[w]; }, common);
+        const std::size_t before = found;
+        found += std::size_t(end - common);
+        if (overlaps.size() < found) overlaps.resize(2 * found);
+        RunOverlap* to = overlaps.data() + before;
         for (const CellRun* run = common; run != end; ++run) {
             int there = run->begin - shift;
             there += there < 0 ? nx : there >= nx ? -nx : 0;
@@ -115,7 +130,7 @@ std::size_t find_overlaps_of(const NumberedRows& one, const NumberedRows& other,
                      run->end - run->begin};
         }
     }
-    return std::size_t(to - begin);
+    return found;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -131,12 +146,6 @@ HWY_EXPORT(number_runs_of);
 HWY_EXPORT(list_runs_of);
 HWY_EXPORT(find_overlaps_of);
 
-constexpr std::size_t kSpareRuns = 4;  // behind those of a list
-
-std::size_t runs_in(const NumberedRows& rows, std::size_t count) {
-    return rows.numbers.rows[rows.first + count] - rows.numbers.rows[rows.first];
-}
-
 }  // namespace
 
 RunNumbers number_runs(const BitPlaneView& plane) {
@@ -144,7 +153,11 @@ RunNumbers number_runs(const BitPlaneView& plane) {
     numbers.rows.resize(std::size_t(plane.extent.y) * std::size_t(plane.extent.z) + 1);
     numbers.starts.resize(plane.word_count());
     numbers.before.resize(plane.word_count());
-    HWY_DYNAMIC_DISPATCH(number_runs_of)(plane, numbers);
+    const std::uint64_t count = HWY_DYNAMIC_DISPATCH(number_runs_of)(plane, numbers);
+    if (count > kMostRuns) {
+        throw Error(ErrorCode::usage, "a state with " + std::to_string(count) + " runs of cells; expected at most " +
+                                          std::to_string(kMostRuns) + " for statistics of clouds");
+    }
     return numbers;
 }
 
@@ -157,18 +170,12 @@ std::vector<CellRun> runs_of(const BitPlaneView& plane, const RunNumbers& number
 
 std::span<const RunOverlap> OverlapFinder::find(const NumberedRows& one, const NumberedRows& other,
                                                 std::size_t count, int shift, Boundary x) {
-    // What two rows share begins where a run of either does; what wraps around may cut one more.
-    const std::size_t most = runs_in(one, count) + runs_in(other, count) + count;
-    if (room_ < most) {
-        room_ = 2 * most;
-        overlaps_.reset(new RunOverlap[room_]);
-    }
     moved_.resize(2 * one.plane.words_per_row);
     common_.resize(std::size_t(one.plane.extent.x) / 2 + 1 + kSpareRuns);
     const std::size_t found =
         HWY_DYNAMIC_DISPATCH(find_overlaps_of)(one, other, count, shift, x == Boundary::periodic,
-                                               moved_.data(), common_.data(), overlaps_.get());
-    return {overlaps_.get(), found};
+                                               moved_.data(), common_.data(), overlaps_);
+    return {overlaps_.data(), found};
 }
 
 }  // namespace nephos

@@ -12,7 +12,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -33,7 +32,9 @@ struct RunNumbers {
     std::vector<std::uint32_t> before;
     std::uint32_t count() const { return rows.back(); }
 };
+// Throws Error(usage) for more than kMostRuns.
 RunNumbers number_runs(const BitPlaneView& plane);
+inline constexpr std::uint64_t kMostRuns = 0xfffffffe;
 
 // Returns the runs of a plane in the order of their numbers.
 std::vector<CellRun> runs_of(const BitPlaneView& plane, const RunNumbers& numbers);
@@ -55,14 +56,13 @@ struct NumberedRows {
 class OverlapFinder {
   public:
     // Returns the cells that `count` rows of `one` share with as many of `other`, row by row, when the latter are moved by
-    // `shift` cells, -nx <= shift <= nx, and wrap around where x is periodic. A pair of runs may come twice then. What is
-    // returned lives until the next call. Preconditions: both planes are of one extent and have these rows.
+    // `shift` cells, -nx <= shift <= nx, and wrap around where x is periodic. A pair of runs may come twice then, and two runs
+    // of `other` that meet at the side count as one, named after the eastern. What is returned lives until the next call. Preconditions: both planes are of one extent and have these rows.
     std::span<const RunOverlap> find(const NumberedRows& one, const NumberedRows& other, std::size_t count, int shift,
                                      Boundary x);
 
   private:
-    std::unique_ptr<RunOverlap[]> overlaps_;
-    std::size_t room_ = 0;  // for overlaps
+    std::vector<RunOverlap> overlaps_;
     std::vector<std::uint64_t> moved_;
     std::vector<CellRun> common_;
 };

@@ -160,12 +160,15 @@ class NaiveTracker {
 TEST(Tracks, MatchTheNaiveTwin) {
     std::set<TrackBegin> begins;
     std::set<TrackEnd> ends;
-    for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    constexpr int kWidths[] = {1, 63, 64, 65, 128};
+    constexpr double kDensities[] = {0.15, 0.02, 0.5, 0.9, 1};
+    for (std::uint64_t seed = 1; seed <= 60; ++seed) {
         SCOPED_TRACE(seed);
         std::mt19937_64 random(seed);
-        const Extent extent{int(random() % 90) + 5, int(random() % 14) + 3, int(random() % 3) + 1};
+        const int nx = seed % 4 == 0 ? kWidths[random() % 5] : int(random() % 90) + 5;
+        const Extent extent{nx, int(random() % 16) + 1, int(random() % 8) + 1};
         const Boundaries b = test::random_boundaries(random);
-        BitPlane cld = test::random_cells(extent, 0.15, random);
+        BitPlane cld = test::random_cells(extent, kDensities[seed % 5], random);
         Tracker tracker(b);
         NaiveTracker naive(b);
         std::vector<CellShift> shifts(std::size_t(extent.z));
@@ -173,8 +176,9 @@ TEST(Tracks, MatchTheNaiveTwin) {
         for (int step = 0; step < 12; ++step) {
             tracker.add(cld.view(), shifts);
             naive.add(cld, shifts);
-            const bool shear = seed % 3 == 0;
-            const CellShift all{std::int64_t(random() % 5) - 2, std::int64_t(random() % 3) - 1};
+            const bool shear = seed % 2 == 0, far = seed % 7 == 0;
+            const std::int64_t most = far ? 3 * extent.x : 2;
+            const CellShift all{std::int64_t(random() % std::uint64_t(2 * most + 1)) - most, std::int64_t(random() % 3) - 1};
             for (int k = 0; k < extent.z; ++k) {
                 CellShift& shift = shifts[std::size_t(k)] = all;
                 if (shear) shift.x += k;
@@ -195,6 +199,28 @@ TEST(Tracks, MatchTheNaiveTwin) {
     }
     EXPECT_EQ(begins.size(), 4u);
     EXPECT_EQ(ends.size(), 3u);
+}
+
+// Levels of every second cell that the wind takes apart, under a shadow without a gap.
+TEST(Tracks, PartsOfAShadowHaveMoreRunsThanIt) {
+    for (const Boundary x : {Boundary::open, Boundary::periodic}) {
+        const Extent extent{512, 8, 2};
+        BitPlane cld(extent);
+        for (int k = 0; k < 2; ++k)
+            for (int j = 0; j < extent.y; ++j)
+                for (int i = 0; i < extent.x; ++i) cld.set(i, j, k, i % 2 == k);
+        const Boundaries b{x, Boundary::open, Boundary::open};
+        Tracker tracker(b);
+        NaiveTracker naive(b);
+        const std::vector<CellShift> shifts{{0, 0}, {1, 0}};
+        for (int step = 0; step < 3; ++step) {
+            tracker.add(cld.view(), shifts);
+            naive.add(cld, shifts);
+        }
+        std::vector<Track> tracks = tracker.tracks();
+        std::ranges::sort(tracks);
+        EXPECT_EQ(tracks, naive.all());
+    }
 }
 
 // Deaths at the ages 1, 2 and 4, and one that merges and was seen to reach 2: by hand, after Kaplan and Meier.
