@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/packed_series.h"
 
+#include <array>
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <new>
@@ -20,6 +22,10 @@ constexpr std::size_t kMostSeries = 64;
 constexpr std::size_t kScaleBytes = 1 + 3 * sizeof(double) + sizeof(std::int8_t);
 
 using Numbers = std::vector<std::uint32_t>;
+
+void require_whole(bool holds) {
+    if (!holds) throw Error(ErrorCode::io, "packed series are damaged");
+}
 
 // Small differences of either sign become small numbers: 0, -1, 1, -2, ...
 std::uint32_t zigzag(std::uint32_t difference) { return difference << 1 ^ (0 - (difference >> 31)); }
@@ -77,7 +83,7 @@ std::vector<std::byte> inflated(std::string_view packed, std::size_t most) {
         uncompress(static_cast<Bytef*>(static_cast<void*>(bytes.data())), &size,
                    static_cast<const Bytef*>(static_cast<const void*>(packed.data())), uLong(packed.size()));
     if (status == Z_MEM_ERROR) throw std::bad_alloc();
-    if (status != Z_OK) throw Error(ErrorCode::io, "packed series are damaged");
+    require_whole(status == Z_OK);
     bytes.resize(size);
     return bytes;
 }
@@ -112,25 +118,33 @@ Numbers numbers_in(std::span<const std::byte> planes) {
     return numbers;
 }
 
-std::optional<SeriesScale> read_scale(ByteReader& reader, std::size_t place) {
-    if (reader.get<std::uint8_t>() == 0) return std::nullopt;
+// The scale of the series that comes after those of `before`.
+std::optional<SeriesScale> read_scale(ByteReader& reader,
+                                      std::span<const std::optional<SeriesScale>> before) {
+    require_whole(!reader.rest().empty());
+    const std::uint8_t has_scale = reader.get<std::uint8_t>();
+    require_whole(has_scale <= 1);
+    if (has_scale == 0) return std::nullopt;
+    require_whole(reader.rest().size() >= kScaleBytes - 1);
     SeriesScale scale;
     scale.offset = reader.get<double>();
     scale.divisor = reader.get<double>();
     scale.scale = reader.get<double>();
     scale.by = reader.get<std::int8_t>();
-    if (scale.by >= int(place)) throw Error(ErrorCode::io, "packed series are damaged");
+    require_whole(scale.by >= -1 && scale.by < int(before.size()));
+    require_whole(scale.by < 0 || before[std::size_t(scale.by)]);
     return scale;
 }
 
 // The values of series with scales.
 std::vector<float> unpack_scaled(std::span<const std::byte> bytes, std::size_t count) {
     ByteReader reader(bytes);
+    require_whole(!bytes.empty());
     const std::size_t series = reader.get<std::uint8_t>();
+    require_whole(series > 0 && series <= kMostSeries && count % series == 0);
     std::vector<std::optional<SeriesScale>> scales;
-    for (std::size_t n = 0; n < series; ++n) scales.push_back(read_scale(reader, n));
-    if (series == 0 || count % series != 0 || reader.rest().size() != 4 * count)
-        throw Error(ErrorCode::io, "packed series are damaged");
+    for (std::size_t n = 0; n < series; ++n) scales.push_back(read_scale(reader, scales));
+    require_whole(reader.rest().size() == 4 * count);
     const Numbers all = numbers_in(reader.rest());
     const std::size_t steps = count / series;
     std::vector<Numbers> known;
@@ -150,11 +164,13 @@ std::vector<float> unpack_scaled(std::span<const std::byte> bytes, std::size_t c
 
 std::string pack_series(std::span<const float> values, std::span<const SeriesScale> scales) {
     if (scales.empty()) return deflated(planes_of(std::vector<Numbers>{bits_of(values)}));
+    assert(scales.size() <= kMostSeries && values.size() % scales.size() == 0);
     ByteWriter writer;
     const std::size_t steps = values.size() / scales.size();
     std::vector<Numbers> known, stored;
     writer.put(std::uint8_t(scales.size()));
     for (std::size_t n = 0; n < scales.size(); ++n) {
+        assert(scales[n].by >= -1 && scales[n].by < int(n));
         const std::span<const float> series = values.subspan(n * steps, steps);
         std::optional<Numbers> numbers = whole_numbers(series, scales[n], known);
         known.push_back(numbers.value_or(Numbers()));
@@ -174,7 +190,7 @@ std::vector<float> unpack_series(std::string_view packed, std::size_t count) {
     if (packed.starts_with(kWithScales))
         return unpack_scaled(inflated(packed.substr(1), 1 + kMostSeries * kScaleBytes + 4 * count), count);
     const std::vector<std::byte> planes = inflated(packed, 4 * count);
-    if (planes.size() != 4 * count) throw Error(ErrorCode::io, "packed series are damaged");
+    require_whole(planes.size() == 4 * count);
     std::vector<float> values;
     for (const std::uint32_t bits : numbers_in(planes)) values.push_back(std::bit_cast<float>(bits));
     return values;

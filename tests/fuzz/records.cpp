@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records of a sweep: lines as they are, and with the version and with the hash at the end of each made right.
+// Records of a sweep: lines as they are, and with the version and with the hash at the end of each made right; packed
+// series with scales, deflated here so that damage comes to their header and not to zlib.
 
+#include "study/records.h"
+
+#include <cstring>
 #include <fstream>
 
+#include "study/packed_series.h"
+
 #include "automaton/checkpoint.h"
-#include "study/records.h"
 #include "tests/fuzz/target.h"
+#include "tests/study/hand_packed.h"
 
 namespace {
 
@@ -68,6 +74,17 @@ class Study {
     std::filesystem::path folder_;
 };
 
+// Two bytes with the number of values, and what is deflated.
+void unpack(std::string_view bytes) {
+    std::uint16_t count = 0;
+    if (bytes.size() < sizeof(count)) return;
+    std::memcpy(&count, bytes.data(), sizeof(count));
+    const std::string packed = test::hand_packed(std::as_bytes(std::span(bytes.substr(sizeof(count)))));
+    fuzz::accepts([&] {
+        fuzz::require(unpack_series(packed, count).size() == count, "as many values as were asked for");
+    });
+}
+
 }  // namespace
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -75,5 +92,6 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const std::string_view text = fuzz::as_text(data, size);
     study.read(text);
     study.read(sealed(text));
+    unpack(text);
     return 0;
 }

@@ -4,14 +4,18 @@
 
 #include "study/packed_series.h"
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
 
+#include "study/run_statistics.h"
 #include <gtest/gtest.h>
 
+#include "core/bytes.h"
 #include "core/error.h"
+#include "tests/study/hand_packed.h"
 
 namespace nephos {
 namespace {
@@ -95,6 +99,115 @@ TEST(PackedSeries, WhatIsNoQuotientComesBackToo) {
         }
     }
     expect_bits_back({}, pack_series({}, scaled_series(1).scales));
+}
+
+// A header by hand: each series with a scale, or as floats.
+class HandMade {
+  public:
+    explicit HandMade(int series) { writer_.put(std::uint8_t(series)); }
+    HandMade& scaled(int by = -1, int has_scale = 1) {
+        writer_.put(std::uint8_t(has_scale));
+        writer_.put(std::array<double, 3>{0, 8, 1});
+        writer_.put(std::int8_t(by));
+        return *this;
+    }
+    HandMade& plain(int series = 1) {
+        for (int n = 0; n < series; ++n) writer_.put(std::uint8_t(0));
+        return *this;
+    }
+    // Values are all 0.
+    std::string with_values(std::size_t count) {
+        for (std::size_t n = 0; n < count; ++n) writer_.put(std::uint32_t(0));
+        return packed();
+    }
+    std::string packed() const { return test::hand_packed(writer_.bytes()); }
+    // Its first bytes alone.
+    std::string cut(std::size_t bytes) const { return test::hand_packed(writer_.bytes().first(bytes)); }
+    std::size_t size() const { return writer_.bytes().size(); }
+
+  private:
+    ByteWriter writer_;
+};
+
+void expect_damaged(const std::string& packed, std::size_t count) {
+    try {
+        unpack_series(packed, count);
+        ADD_FAILURE() << "is accepted";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::io);
+        EXPECT_STREQ(error.what(), "packed series are damaged");
+    }
+}
+
+// Whose sum of bytes is right: what zlib cannot see the reader of the header has to.
+TEST(PackedSeries, FaultsOfAHeaderAreSeen) {
+    EXPECT_EQ(unpack_series(HandMade(3).scaled().scaled(0).plain().with_values(6), 6).size(), 6u);
+    EXPECT_EQ(unpack_series(HandMade(64).plain(64).with_values(128), 128).size(), 128u);
+    for (const int by : {1, 2, 3, 127, -2, -128}) {
+        SCOPED_TRACE(by);
+        expect_damaged(HandMade(3).scaled().scaled(by).scaled().with_values(6), 6);
+    }
+    expect_damaged(HandMade(3).plain().scaled(0).scaled().with_values(6), 6);
+    expect_damaged(HandMade(1).scaled(-1, 2).with_values(6), 6);
+    expect_damaged(HandMade(0).with_values(6), 6);
+    expect_damaged(HandMade(0).with_values(0), 0);
+    for (int series = 65; series <= 255; ++series) {
+        SCOPED_TRACE(series);
+        expect_damaged(HandMade(series).plain(series).with_values(std::size_t(series)), std::size_t(series));
+    }
+    const HandMade two = HandMade(2).scaled().scaled(0);
+    for (std::size_t bytes = 0; bytes <= two.size(); ++bytes) {
+        SCOPED_TRACE(bytes);
+        expect_damaged(two.cut(bytes), 2);
+    }
+    for (const std::size_t count : {1u, 5u, 7u}) {
+        SCOPED_TRACE(count);
+        expect_damaged(HandMade(2).scaled().scaled().with_values(count), count);
+    }
+    for (const std::size_t count : {4u, 8u}) {
+        SCOPED_TRACE(count);
+        expect_damaged(HandMade(2).scaled().scaled().with_values(6), count);
+    }
+}
+
+// Returns for each series whether it is stored by its scale.
+std::vector<bool> stored_by_scale(const std::string& packed, std::size_t count) {
+    std::vector<std::byte> bytes(4096 + 4 * count);
+    uLongf size = uLongf(bytes.size());
+    EXPECT_EQ(packed.front(), '\1');
+    EXPECT_EQ(uncompress(static_cast<Bytef*>(static_cast<void*>(bytes.data())), &size,
+                         static_cast<const Bytef*>(static_cast<const void*>(packed.data() + 1)),
+                         uLong(packed.size() - 1)),
+              Z_OK);
+    bytes.resize(size);
+    ByteReader reader(bytes);
+    std::vector<bool> stored(reader.get<std::uint8_t>());
+    for (std::size_t n = 0; n < stored.size(); ++n) {
+        stored[n] = reader.get<std::uint8_t>() == 1;
+        if (stored[n]) reader.skip(3 * sizeof(double) + 1);
+    }
+    return stored;
+}
+
+// Cells of an odd size above an odd floor; the first states have no cloud, and no base.
+TEST(PackedSeries, EverySeriesOfARunIsOfWholeNumbers) {
+    Scene scene;
+    scene.automaton.extent = {70, 30, 12};
+    scene.automaton.boundaries = {Boundary::periodic, Boundary::periodic, Boundary::open};
+    scene.automaton.placement = {{0, 0, 412.7}, 37.3};
+    scene.automaton.initial = InitialState::empty;
+    scene.automaton.field.background = {0.003, 1e-4, 0.12};
+    SweepOptions options;
+    options.steps = {120, 120, {}};
+    options.clouds_every = 0;
+    const RunResult run = run_for_statistics(scene, options, false);
+    ASSERT_EQ(run.series.size(), 121 * kSeries.size());
+    EXPECT_TRUE(std::isnan(run.series[4 * 121])) << "no base without cloud";
+    EXPECT_GT(run.series[120], 0) << "no cloud at the end";
+    const std::string packed = pack_series(run.series, run.scales);
+    EXPECT_EQ(stored_by_scale(packed, run.series.size()), std::vector<bool>(kSeries.size(), true));
+    EXPECT_LT(packed.size(), 121 * kSeries.size() * 2) << "half of their floats";
+    expect_bits_back(run.series, packed);
 }
 
 TEST(PackedSeries, DamageIsSeen) {
