@@ -58,8 +58,7 @@ inline float detail_y(const Window& w, std::size_t i, std::size_t j) {
 class Levels {
   public:
     Levels(const DensityGrid& density, const Boundaries& boundaries)
-        : density_(density),
-          tree_(OpenvdbAccess::grid(density).tree()),
+        : tree_(OpenvdbAccess::grid(density).tree()),
           extent_(density.extent()),
           boundaries_(boundaries) {
         for (const Block& block : blocks_of(density)) blocks_.push_back(block.origin);
@@ -154,7 +153,6 @@ class Levels {
     }
 
   private:
-    const DensityGrid& density_;
     const FloatTree& tree_;
     const Extent extent_;
     const Boundaries boundaries_;

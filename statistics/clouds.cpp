@@ -26,7 +26,7 @@ class Sets {
     void unite(std::uint32_t a, std::uint32_t b) {
         // Nearly always two steps are enough, and how many it takes cannot be foretold.
         std::uint32_t one = roots_[roots_[a]], other = roots_[roots_[b]];
-        if ((roots_[one] != one) | (roots_[other] != other)) {
+        if ((int(roots_[one] != one) | int(roots_[other] != other)) != 0) {
             one = root(one);
             other = root(other);
         }
