@@ -24,6 +24,7 @@ FROM_BELOW = {"camera.position_m": "[0, -900, 2]", "camera.target_m": "[0, 2600,
 HIGH = {"camera.position_m": "[0, -9000, 10000]", "camera.target_m": "[0, 16000, 0]"}
 SPLASHES = {"precipitation.splashes": "1", "camera.path": "[]", "camera.position_m": "[0, 1000, 1.7]",
             "camera.target_m": "[6, 1012, 0.2]"}
+WITHIN_RAIN = {"camera.path": "[]", "camera.position_m": "[0, 1400, 1.7]", "camera.target_m": "[0, 2400, 60]"}
 NO_DETAIL = {"detail.enabled": "false"}
 GENERA = ["Ci", "Cc", "Cs", "Ac", "As", "Ns", "Sc", "St", "Cu", "Cb", "St-fra", "Cu-fra"]
 
@@ -45,7 +46,7 @@ PICTURES = {
     "cirrus.png": (1, (640, 480), [("cirrus", 1, {})]),
     "rain-shafts.jpg": (1, (640, 480), [("rain", 1, {})]),
     "rain-edge.jpg": (1, (640, 480), [("rain", 150, {})]),
-    "rain-near.jpg": (1, (640, 480), [("rain", 200, {})]),
+    "rain-near.jpg": (1, (640, 480), [("rain", 205, WITHIN_RAIN)]),
     "snow.jpg": (1, (640, 480), [("snow", 60, {})]),
     "rain-found.jpg": (1, (960, 600), [("rain-found", 24, {})]),
     "rainbow.jpg": (1, (960, 600), [("rainbow", 1, {})]),

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -442,6 +443,37 @@ TEST(Precipitation, LiesBehindNearerClouds) {
     std::fill(near.transmittance.begin(), near.transmittance.end(), 0.0f);
     painter.draw(near, options, weather, 0);
     EXPECT_NE(near.beauty, test::grey(options.camera).beauty);
+}
+
+// As in photographs: in heavy rain streaks are brighter than what is dark behind them and darker than a bright sky, thin,
+// and a part of the picture that is seen at once; farther out in the area there are fewer.
+TEST(Precipitation, StreaksStandOutOnDarkAndOnBright) {
+    const Weather weather = weather_of(area());
+    const auto changed = [&](const Vec3& eye, float behind, double& mean) {
+        RenderOptions options = options_at(eye, eye + Vec3{0, 100, 10});
+        options.precipitation.shafts = 0;
+        options.precipitation.edge = 0.8;
+        Picture picture = test::grey(options.camera, behind);
+        PrecipitationPainter().draw(picture, options, weather, 3);
+        std::size_t count = 0;
+        mean = 0;
+        for (std::size_t i = 1; i < picture.beauty.size(); i += 3) {
+            const double contrast = double(picture.beauty[i]) / double(behind) - 1;
+            count += std::abs(contrast) > 0.03 ? 1 : 0;
+            mean += contrast / double(picture.pixels());
+        }
+        return double(count) / double(picture.pixels());
+    };
+    double on_dark = 0, on_bright = 0, at_rim = 0;
+    const double dark = changed({100, 900, 2}, 0.04f, on_dark), bright = changed({100, 900, 2}, 1.2f, on_bright);
+    std::printf("dark: %.3f of the pixels, mean %.4f; bright: %.3f, %.4f\n", dark, on_dark, bright, on_bright);
+    EXPECT_GT(on_dark, 0.01);
+    EXPECT_LT(on_bright, -0.002);
+    EXPECT_GT(dark, 0.05);
+    EXPECT_LT(dark, 0.7);
+    EXPECT_GT(bright, 0.02);
+    EXPECT_LT(changed({100, 590, 2}, 0.04f, at_rim), dark);
+    EXPECT_LT(at_rim, 0.5 * on_dark);
 }
 
 TEST(Precipitation, RefusesBadOptions) {
