@@ -34,7 +34,7 @@ struct GroundPass {
     RippleGrid ripples;
     const MirrorView* mirror = nullptr;
     float reflection = 0;
-    bool lying = false;  // whether water or snow lie somewhere
+    bool lying = false;  // whether water or snow lie somewhere, or rain makes ripples
 };
 
 struct WetGround;

@@ -86,8 +86,8 @@ HWY_INLINE Floats glint(const Floats3& to_eye, const Floats3& to_sun, const Slop
     return hn::Div(hn::Mul(reflectance, density), hn::Mul(hn::Mul(set(4.0f), fourth), seen_area));
 }
 
-// Returns the surface of the water that a pixel sees at a distance, with this share of the sun's light.
-HWY_INLINE Surface water_surface(const GroundPass& pass, const Seen& seen, Floats distance, Floats sun) {
+// Returns the surface of the water that a pixel sees at a distance, with this share of the sun's light and this rain, mm/h.
+HWY_INLINE Surface water_surface(const GroundPass& pass, const Seen& seen, Floats distance, Floats sun, Floats rain) {
     const Water& water = pass.water;
     const Lanes d;
     const Floats one = set(1.0f), zero = hn::Zero(d);
@@ -95,7 +95,10 @@ HWY_INLINE Surface water_surface(const GroundPass& pass, const Seen& seen, Float
     // Gusts roughen the water in patches.
     const ResolvedNoise gusts = resolved_noise(water.gusts, seen.point, print.longest);
     const Floats strength = hn::Max(hn::MulAdd(set(0.2f), gusts.value, one), set(0.3f));
-    const Slopes slopes = waves_at(water, seen.point, print, strength);
+    Slopes slopes = waves_at(water, seen.point, print, strength);
+    // The rings of drops run over the waves; half of their variance is on either axis.
+    const Slopes rings = ripples_at(pass.ripples, seen.point, seen.pixel_m, rain);
+    slopes = {hn::Add(slopes.x, rings.x), hn::Add(slopes.y, rings.y), hn::MulAdd(set(0.5f), rings.variance, slopes.variance)};
 
     // The eye from the water, whose plane bends away with the Earth.
     const Floats level = hn::Sqrt(hn::Max(hn::MulAdd(seen.ray.x, seen.ray.x, hn::Mul(seen.ray.y, seen.ray.y)), set(1.0e-8f)));

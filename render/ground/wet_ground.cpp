@@ -107,7 +107,7 @@ HWY_INLINE Floats3 changed(const GroundPass& pass, const Floats3& direction) {
     const ShadowTexels shadow{pass.shadow, pass.shadow_size};
     if (pass.water.enabled) {
         if (pass.mirror != nullptr) seen.veil = air_light(pass.white, seen.ray, near, seen.beta);
-        surface = water_surface(pass, seen, near, sun_share(pass.white, shadow, seen.point));
+        surface = water_surface(pass, seen, near, sun_share(pass.white, shadow, seen.point), lying.rain_mm_per_h);
     } else if (!hn::AllFalse(d, covers)) {
         if (pass.mirror != nullptr) seen.veil = air_light(pass.white, seen.ray, near, seen.beta);
         const ResolvedNoise hollows = resolved_noise(pass.hollows, seen.point, seen.pixel_m);
@@ -266,11 +266,11 @@ GroundPass ground_pass(const WetGround& ground, const ShadowFrame& shadow_frame)
     pass.shadow = ground.shadow;
     pass.shadow_size = ground.shadow_size;
     pass.cover = texels_of(ground.cover, eye);
-    pass.lying = any_water(ground.cover) || any_snow(ground.cover);
     const double puddle_m = options.wet_ground.puddle_size_m;
     pass.hollows = noise_octaves({150 * puddle_m, 0.45, 10, 1.0, 0x77657400u}, eye);
     pass.tufts = noise_octaves({900, 0.42, 11, 1.0, 0x736e6f77u}, eye);
     pass.ripples = ripple_grid(ground.cover, ground.time_s, options.wet_ground.ripples, eye);
+    pass.lying = any_water(ground.cover) || any_snow(ground.cover) || !pass.ripples.slopes.x.empty();
     pass.mirror = ground.mirror;
     pass.reflection = float(options.wet_ground.reflection);
     return pass;

@@ -4,7 +4,7 @@
 
 layout(constant_id = 11) const bool kSea = false;      // GroundPattern::water
 layout(constant_id = 12) const bool kCountry = false;  // GroundPattern::country
-layout(constant_id = 13) const bool kLying = false;    // water or snow lie on the ground
+layout(constant_id = 13) const bool kLying = false;    // water or snow lie on the ground, or rain falls into water
 
 #include "render/vulkan/ground_noise.glsl"
 #include "render/vulkan/ground_country.glsl"
@@ -27,8 +27,8 @@ vec3 changed(vec3 ray) {
     seen.distance = level_distance(ray);
     if (!(seen.distance < 1.0e30)) return vec3(0.0);
     seen.point = seen.distance * ray;
-    vec3 lying = kLying && !kSea ? lying_at(seen.point.xy) : vec3(0.0);  // nothing lies on water
-    bool covers = max(lying.x, lying.y) > 0.0;
+    vec3 lying = kLying ? lying_at(seen.point.xy) : vec3(0.0);
+    bool covers = !kSea && max(lying.x, lying.y) > 0.0;  // nothing lies on water
     if (!kSea && !kCountry && !covers) return vec3(0.0);
     seen.beta = air_transmittance(ray, seen.distance);
     seen.veil = kMirror ? air_light(ray, seen.distance, seen.beta) : vec3(0.0);
@@ -38,7 +38,7 @@ vec3 changed(vec3 ray) {
     Surface surface = Surface(seen.dry, vec3(0.0));
     float sun = sun_share(seen.point);
     if (kSea) {
-        surface = water_surface(seen, sun);
+        surface = water_surface(seen, sun, lying.z);
     } else if (covers) {
         surface = wet_surface(seen, lying);
         lay_snow(seen, lying.y, surface);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sea: render/ground/water-inl.h in shaders; needs ground_mirror.glsl, ground_country.glsl and frame.glsl.
+// A sea: render/ground/water-inl.h in shaders; needs ground_wet.glsl, ground_country.glsl and frame.glsl.
 
 layout(set = 0, binding = 29, std430) readonly buffer Waves {
     GroundWave waves[];
@@ -39,12 +39,13 @@ float glint_of(vec3 to_eye, vec2 slopes, float variance, float seen_area) {
     return reflectance * density / (4.0 * up * up * up * up * seen_area);
 }
 
-// Returns the surface of the water that a pixel sees, with this share of the sun's light.
-Surface water_surface(Seen seen, float sun) {
+// Returns the surface of the water that a pixel sees, with this share of the sun's light and this rain, mm/h.
+Surface water_surface(Seen seen, float sun, float rain) {
     Footprint print = footprint_of(seen.ray, seen.distance, frame.up.w);
     // Gusts roughen the water in patches.
     float gusts = resolved_noise(ground_data.gusts, seen.point.xy, print.longest).x;
     vec3 slopes = waves_at(seen.point.xy, print, max(1.0 + 0.2 * gusts, 0.3));
+    slopes += vec3(1.0, 1.0, 0.5) * ripples_at(seen.point.xy, seen.pixel_m, rain);  // the rings of drops
     // The eye from the water, whose plane bends away with the Earth.
     float level = sqrt(max(dot(seen.ray.xy, seen.ray.xy), 1.0e-8));
     vec2 eye = -seen.ray.xy / level;

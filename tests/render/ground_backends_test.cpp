@@ -91,6 +91,13 @@ std::vector<GroundView> views() {
         v.options.sun.elevation_deg = 15;
         v.options.atmosphere.model = AirModel::physical;
     });
+    add("sea in the rain", [&](GroundView& v) {
+        sea(v);
+        v.options.water.wind_m_per_s = 2;
+        v.cover.outside_rain_mm_per_h = 12;
+        v.options.camera.position_m = {3, 2, 1.3};
+        v.options.camera.target_m = {3, 6, 0};
+    });
     add("a map", [&](GroundView& v) {
         wet(v);
         v.map = true;
@@ -269,7 +276,7 @@ TEST_F(GroundBackends, HaveTheBitsOfThoseDrawnOneByOne) {
     }
     test::expect_same_bits(vulkan_.finish(std::move(pending.back())), expected.back());
     Renderer in_parts(test::validated(Splatting::vulkan, 40));
-    for (std::size_t n = 0; n < 9; ++n) {
+    for (std::size_t n = 0; n < 10; ++n) {
         SCOPED_TRACE(all[n].name);
         EXPECT_LE(test::largest_difference(draw(in_parts, all[n]).beauty, expected[n].beauty), 1e-4f);
     }

@@ -192,6 +192,35 @@ TEST(SeaTest, FoamWhitensTheMeanAsMuchAsItsCover) {
     EXPECT_NEAR(with - without, expected, 0.1 * expected);
 }
 
+// Rings of drops on a still sea near the eye: they come and go with the rain, and more rain makes steeper ones.
+TEST(SeaTest, DropsMakeRings) {
+    RenderOptions options = sea(0);
+    options.camera.position_m = {3, 2, 1.3};
+    options.camera.target_m = {3, 5, 0};
+    const auto picture_of = [&](double rain_mm_per_h, double time_s) {
+        Splats splats;
+        splats.time_s = time_s;
+        splats.ground_cover.emplace().outside_rain_mm_per_h = rain_mm_per_h;
+        return test::renderer(Splatting::cpu).draw_splats(splats, options);
+    };
+    const Picture still = picture_of(0, 5);
+    const auto roughness = [&](double rain_mm_per_h, double time_s) {  // what rain adds from pixel to pixel along rows
+        const Picture picture = picture_of(rain_mm_per_h, time_s);
+        const auto added = [&](int x, int y) { return pixel(picture, x, y)[1] - pixel(still, x, y)[1]; };
+        double sum = 0;
+        for (int y = 36; y < 72; ++y)
+            for (int x = 1; x < 96; ++x) sum += std::abs(added(x, y) - added(x - 1, y));
+        return sum;
+    };
+    EXPECT_EQ(roughness(0, 5.1), 0);
+    const double drizzle = roughness(2, 5), rain = roughness(20, 5);
+    EXPECT_GT(rain, 0.2);
+    EXPECT_GT(rain, 1.2 * drizzle);
+    EXPECT_GT(drizzle, 0.01);
+    EXPECT_NE(roughness(20, 5.1), rain);
+    EXPECT_EQ(roughness(20, 5), rain);
+}
+
 TEST(SeaTest, BackEndsAgree) {
     RenderOptions options = sea(9);
     options.water.whitecaps = 1;
