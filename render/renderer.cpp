@@ -108,7 +108,13 @@ std::vector<float> Renderer::Impl::absorb_light(const Splats& splats, const Rend
     const DensityBlocks blocks(lit.given, splats.metaballs.extinction_per_m);  // cubes of the voxels' size
     if (absorbs) absorb_sunlight(lit, blocks, options);
     if (flash == nullptr) return {};
-    return flash_by_absorption(lit.cloud, blocks, flash->position_m, options.light.light_distance_m);
+    std::vector<float> light = flash_by_absorption(lit.cloud, blocks, flash->position_m, options.light.light_distance_m);
+    if (!splats.to_flash.any()) return light;
+    for (std::size_t i = 0; i < light.size(); ++i) {
+        const Metaball& ball = lit.cloud.metaballs[lit.cloud.visible[i]];
+        light[i] *= std::exp(-splats.to_flash.at({ball.x, ball.y, ball.z}));
+    }
+    return light;
 }
 
 void Renderer::Impl::shade_by_veils(const Splats& splats, const RenderOptions& options) {

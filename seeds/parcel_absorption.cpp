@@ -99,7 +99,6 @@ ParcelAbsorption::ParcelAbsorption(std::span<const AbsorbingCloud> clouds, const
             parcel.centre_m = each.ellipsoid.centre_m;
             parcel.per_m = 1.0 / each.ellipsoid.semi_axes_m;
             parcel.way = to_sun_ * parcel.per_m;
-            parcel.way_squared = dot(parcel.way, parcel.way);
             parcel.weight = each.weight;
             parcels_.push_back(parcel);
         }
@@ -142,24 +141,27 @@ void ParcelAbsorption::bin() {
 
 // Part and absorption of one cloud, multiplied. In an ellipsoid's own space the ray q + t way meets the unit sphere at the roots
 // of way^2 t^2 + 2 (q . way) t + q^2 - 1.
-double ParcelAbsorption::absorbed_part(const Group& cloud, const Vec3& place_m) const {
+template <class WayOf>
+double ParcelAbsorption::absorbed_part(const Group& cloud, const Vec3& place_m, double reach_m,
+                                       const WayOf& way_of) const {
     double length_m = 0, part = 0;
     for (std::size_t i = cloud.first; i < cloud.first + cloud.count; ++i) {
         const Parcel& parcel = parcels_[i];
-        const Vec3 q = (place_m - parcel.centre_m) * parcel.per_m;
-        const double squared = dot(q, q), along = dot(q, parcel.way);
+        const Vec3 q = (place_m - parcel.centre_m) * parcel.per_m, way = way_of(parcel);
+        const double squared = dot(q, q), along = dot(q, way), way_squared = dot(way, way);
         if (squared < kReach * kReach)
             part = std::max(part, std::min(1.0, kWholeWeight * parcel.weight) * fade(std::sqrt(squared)));
-        const double under_root = along * along - parcel.way_squared * (squared - 1);
+        const double under_root = along * along - way_squared * (squared - 1);
         if (under_root <= 0) continue;
-        const double root = std::sqrt(under_root);
+        const double root = std::sqrt(under_root), end = reach_m * way_squared;
         length_m +=
-            parcel.weight * (std::max(root - along, 0.0) - std::max(-root - along, 0.0)) / parcel.way_squared;
+            parcel.weight * (std::clamp(root - along, 0.0, end) - std::clamp(-root - along, 0.0, end)) / way_squared;
     }
     return part * std::min(length_m / cloud.light_distance_m, 1.0);
 }
 
-double ParcelAbsorption::sunlight_at(const Vec3& place_m) const {
+template <class WayOf>
+double ParcelAbsorption::left_at(const Vec3& place_m, double reach_m, const WayOf& way_of) const {
     if (clouds_.empty()) return 1;
     const Vec2 cell = (Vec2(place_m) - low_m_) * per_m_;
     if (!(cell.x >= 0 && cell.y >= 0 && cell.x <= cells_[0] && cell.y <= cells_[1])) return 1;
@@ -171,10 +173,21 @@ double ParcelAbsorption::sunlight_at(const Vec3& place_m) const {
         if (place_m.x < cloud.low_m.x || place_m.y < cloud.low_m.y || place_m.z < cloud.low_m.z ||
             place_m.x > cloud.high_m.x || place_m.y > cloud.high_m.y || place_m.z > cloud.high_m.z)
             continue;
-        left *= 1 - cloud.strength * absorbed_part(cloud, place_m);
+        left *= 1 - cloud.strength * absorbed_part(cloud, place_m, reach_m, way_of);
         if (left <= 0) return 0;
     }
     return left;
+}
+
+double ParcelAbsorption::sunlight_at(const Vec3& place_m) const {
+    return left_at(place_m, std::numeric_limits<double>::infinity(), [](const Parcel& parcel) { return parcel.way; });
+}
+
+double ParcelAbsorption::lightning_at(const Vec3& place_m, const Vec3& flash_m) const {
+    const Vec3 way = flash_m - place_m;
+    const double reach_m = length(way);
+    if (!(reach_m > 0)) return 1;
+    return left_at(place_m, reach_m, [&](const Parcel& parcel) { return (1 / reach_m) * way * parcel.per_m; });
 }
 
 std::vector<double> ParcelAbsorption::content() const {

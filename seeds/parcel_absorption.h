@@ -58,6 +58,10 @@ class ParcelAbsorption {
     // Returns the fraction of the sunlight, 0..1, that the clouds leave to voxels at a place of the world. Thread-safe.
     double sunlight_at(const Vec3& place_m) const;
 
+    // Returns the fraction of the light of a lightning that the clouds leave to voxels at a place: the same with the way
+    // to the lightning, which may be in a cloud, in the place of that to the sun. Thread-safe.
+    double lightning_at(const Vec3& place_m, const Vec3& flash_m) const;
+
     // Returns all numbers that sunlight_at() depends on, for keys of caches.
     std::vector<double> content() const;
 
@@ -65,8 +69,7 @@ class ParcelAbsorption {
     // An ellipsoid as the unit sphere of a space of its own.
     struct Parcel {
         Vec3 centre_m, per_m;  // 1 / semi-axes
-        Vec3 way;              // of the light there, for each metre in the world
-        double way_squared = 1;
+        Vec3 way;              // of the sun's light there, for each metre in the world
         double weight = 1;
     };
     struct Group {
@@ -75,7 +78,11 @@ class ParcelAbsorption {
         Vec3 low_m, high_m;  // beyond it the cloud has no part
     };
 
-    double absorbed_part(const Group& cloud, const Vec3& place_m) const;
+    // `way_of(parcel)`: Parcel::way of the light, which is `reach_m` away.
+    template <class WayOf>
+    double absorbed_part(const Group& cloud, const Vec3& place_m, double reach_m, const WayOf& way_of) const;
+    template <class WayOf>
+    double left_at(const Vec3& place_m, double reach_m, const WayOf& way_of) const;
     void bin();
 
     Vec3 to_sun_;

@@ -34,8 +34,13 @@ double fastest_m_per_s(const Wind& wind) {
 
 constexpr double kLeastLeft = 1e-30;  // of the light, so that depths stay finite
 
-// What clouds take of the light in the voxels that they drive.
-AddedDepth depth_in_voxels(std::span<const SkyLayer> layers, const Sun& sun, double time_s) {
+// What clouds take of the sunlight, and of lightning, in the voxels that they drive.
+struct DepthsInVoxels {
+    AddedDepth to_sun, to_flash;
+};
+
+DepthsInVoxels depths_in_voxels(std::span<const SkyLayer> layers, const Sun& sun, const std::optional<Flash>& flash,
+                                double time_s) {
     std::vector<AbsorbingCloud> clouds;
     for (const SkyLayer& layer : layers) {
         if (layer.voxels == nullptr) continue;
@@ -50,13 +55,15 @@ AddedDepth depth_in_voxels(std::span<const SkyLayer> layers, const Sun& sun, dou
     if (absorption->empty()) return {};
     const std::vector<double> content = absorption->content();
     const StateHash hash = hash_of_bytes(std::as_bytes(std::span(content)));
-    AddedDepth depth;
-    depth.key = {hash.high, hash.low};
-    depth.at = [absorption](const Vec3& place_m) {
-        const double left = absorption->sunlight_at(place_m);
-        return left < 1 ? float(-std::log(std::max(left, kLeastLeft))) : 0.0f;
-    };
-    return depth;
+    const auto depth_of = [](double left) { return left < 1 ? float(-std::log(std::max(left, kLeastLeft))) : 0.0f; };
+    DepthsInVoxels depths;
+    depths.to_sun.key = {hash.high, hash.low};
+    depths.to_sun.at = [absorption, depth_of](const Vec3& place_m) { return depth_of(absorption->sunlight_at(place_m)); };
+    if (flash)
+        depths.to_flash.at = [absorption, depth_of, from_m = flash->position_m](const Vec3& place_m) {
+            return depth_of(absorption->lightning_at(place_m, from_m));
+        };
+    return depths;
 }
 
 }  // namespace
@@ -255,10 +262,11 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
         rainfall->options.sun = options.sun;
         if (ground_cover) rainfall->options.ground.albedo = mean_albedo(options, *ground_cover);
     }
+    DepthsInVoxels depths = depths_in_voxels(layers, options.sun, flash, time_s);
     PendingPicture picture =
         renderer.begin({drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all,
                         ground_cover, textures_ ? textures_->pictures : nullptr, drawn.unseen,
-                        depth_in_voxels(layers, options.sun, time_s), terrain_},
+                        std::move(depths.to_sun), terrain_, std::move(depths.to_flash)},
                        options, veils, std::move(rainfall));
     return {std::move(picture), std::move(options), std::move(lines), std::move(drawn)};
 }

@@ -113,6 +113,8 @@ struct Splats {
     std::span<const CloudBillboard> unseen{};
     AddedDepth in_voxels{};                      // that metaballs and their detail have; it casts no shadow
     std::shared_ptr<const HeightMap> terrain{};  // ground that is not level (render/terrain/height_map.h); null: it is
+    // That metaballs have between their centres and the lightning, beside other cloud; its key is not read.
+    AddedDepth to_flash{};
 };
 
 }  // namespace nephos

@@ -109,6 +109,20 @@ TEST(ParcelAbsorption, ConcernsTheCloudsOwnPlacesAlone) {
     EXPECT_EQ(absorption.sunlight_at({-700, 0, 1000}), 1) << "behind it";
 }
 
+// The way to a lightning ends there: in the cloud, behind the place, or beyond the cloud, where it is as the sun.
+TEST(ParcelAbsorption, LightningIsAbsorbedOnItsWay) {
+    const AbsorbingCloud sphere{{ellipsoid({0, 0, 1000}, {200, 200, 200})}, 800, 1};
+    const ParcelAbsorption absorption({&sphere, 1}, {1, 0, 0});
+    EXPECT_NEAR(absorption.lightning_at({0, 0, 1000}, {0, 0, 1100}), 1 - 100.0 / 800, 1e-12);
+    EXPECT_NEAR(absorption.lightning_at({0, 0, 1000}, {0, 0, 900}), 1 - 100.0 / 800, 1e-12);
+    EXPECT_NEAR(absorption.lightning_at({0, 0, 1000}, {0, 0, 5000}), 1 - 200.0 / 800, 1e-12);
+    EXPECT_NEAR(absorption.lightning_at({0, 0, 850}, {0, 0, 1150}), 1 - 300.0 / 800, 1e-12);
+    EXPECT_NEAR(absorption.lightning_at({0, -200, 1000}, {0, -900, 1000}), 1, 1e-12) << "away from the cloud";
+    EXPECT_EQ(absorption.lightning_at({0, 0, 1000}, {0, 0, 1000}), 1);
+    const Vec3 place{60, -80, 940}, far_m = place + 1e7 * Vec3{1, 0, 0};
+    EXPECT_NEAR(absorption.lightning_at(place, far_m), absorption.sunlight_at(place), 1e-9);
+}
+
 TEST(ParcelAbsorption, SaysWhatIsWrong) {
     const AbsorbingCloud good{{ellipsoid({0, 0, 1000}, {200, 200, 200})}, 150, 1};
     AbsorbingCloud bad = good;

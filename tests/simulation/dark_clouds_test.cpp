@@ -97,6 +97,28 @@ TEST(DarkClouds, LoseLightWhereTheirEllipsoidsAre) {
     }
 }
 
+// By night a lightning leaves dark clouds darker than bright ones, in every back-end, and nothing is brighter for it.
+TEST(DarkClouds, LoseLightningToo) {
+    const std::vector<std::string> night{
+        kMetaballs, "frames.exr=false", "camera.exposure=manual", "sun.elevation_deg=-15",
+        "lightning=[{position_m=[0,4000,1500], time_s=389.9, intensity=3}]"};
+    std::vector<std::string> none = night;
+    none.push_back("layer[0].light_absorption=0");
+    const Scene with = small_scene(night), without = small_scene(none);
+    with_frame(with, [&](const FrameResult& frame) {
+        const Picture dark = drawn(with, frame), bright = drawn(without, frame);
+        double taken = 0, sum = 0;
+        for (std::size_t i = 0; i < dark.beauty.size(); ++i) {
+            EXPECT_LE(dark.beauty[i], bright.beauty[i] * 1.001f + 1e-4f) << i;
+            taken += double(bright.beauty[i] - dark.beauty[i]);
+            sum += double(bright.beauty[i]);
+        }
+        EXPECT_GT(taken, 0.02 * sum);
+        for (const Splatting way : {Splatting::vulkan, Splatting::blended})
+            EXPECT_LT(test::apart_by(dark.beauty, drawn(with, frame, way).beauty), 1.0f / 255);
+    });
+}
+
 TEST(DarkClouds, AreTheSameInEveryBackend) {
     const Scene plain = small_scene({kMetaballs, "frames.exr=false"}),
                 detailed = small_scene({"frames.exr=false"});
