@@ -46,6 +46,8 @@ struct BillboardShade::Footprint {
     double half_x = 1, half_y = 1;  // texels
     float opacity = 1;              // of the billboard, thinned where it was widened
     int first_row = 0, end_row = 0;
+    int first_column = 0, end_column = 0;
+    unsigned level = 0;  // of the textures
 };
 
 BillboardShade::BillboardShade(std::span<const CloudBillboard> seen, std::span<const CloudBillboard> unseen,
@@ -64,11 +66,10 @@ BillboardShade::BillboardShade(std::span<const CloudBillboard> seen, std::span<c
               [&](const Caster& a, const Caster& b) { return key(a) < key(b); });
     for (const Caster& caster : casters_)
         longest_half_chord_ = std::max(longest_half_chord_, caster.half_chord);
-    const auto by_place = [](const ShadowCaster& a, const ShadowCaster& b) {
-        return std::tie(a.centre_m.x, a.centre_m.y, a.centre_m.z, a.radius_m, a.weight) <
-               std::tie(b.centre_m.x, b.centre_m.y, b.centre_m.z, b.radius_m, b.weight);
-    };
-    std::sort(spheres_.begin(), spheres_.end(), by_place);
+    for (const Caster& c : casters_) {
+        add_spheres(c.u * right_ + c.v * up_ - c.s * to_sun_, double(c.half_u), double(c.half_height),
+                    kMeanOpacity * double(c.opacity) * std::numbers::pi * double(c.half_u) * double(c.half_v), spheres_);
+    }
     bin();
 }
 
@@ -87,13 +88,11 @@ void BillboardShade::add(std::span<const CloudBillboard> billboards) {
         caster.half_u = float(a);
         caster.half_v = float(std::hypot(b * cosine, a * sine));
         caster.half_chord = float(1 / std::hypot(cosine / a, sine / b));
+        caster.half_height = float(b);
         caster.opacity = of.opacity;
         caster.layer = std::uint16_t(picture.layer);
         caster.turn = std::uint16_t(picture.turn);
         caster.cloud = of.cloud;
-        add_spheres(of.centre_m, a, b,
-                    kMeanOpacity * double(of.opacity) * std::numbers::pi * a * double(caster.half_v),
-                    spheres_);
     }
 }
 
@@ -172,26 +171,14 @@ BillboardShade::Footprint BillboardShade::footprint(const Caster& caster, const 
     on.half_x = std::max(half_x, least);
     on.half_y = std::max(half_y, least);
     on.opacity = float(double(caster.opacity) * half_x * half_y / (on.half_x * on.half_y));
-    const auto row = [&](double y) { return int(std::clamp(std::ceil(y - 0.5), 0.0, double(size))); };
-    on.first_row = row(on.y - on.half_y);
-    on.end_row = row(on.y + on.half_y);
-    return on;
-}
-
-void BillboardShade::cast_row(const Caster& caster, const Footprint& on, int row,
-                              std::span<float> texels) const {
+    const auto texel = [&](double at) { return int(std::clamp(std::ceil(at - 0.5), 0.0, double(size))); };
+    on.first_row = texel(on.y - on.half_y);
+    on.end_row = texel(on.y + on.half_y);
+    on.first_column = texel(on.x - on.half_x);
+    on.end_column = texel(on.x + on.half_x);
     const double texels_per_texel = kBillboardTexels / (2 * std::max(on.half_x, on.half_y));
-    unsigned level = 0;
-    while (level + 1 < unsigned{kBillboardLevels} && texels_per_texel > double(1u << level) * 1.4142) ++level;
-    const TurnedTexture texture(billboard_texels(pictures_.get()), level, caster.layer, caster.turn);
-    const auto column = [&](double x) {
-        return int(std::clamp(std::ceil(x - 0.5), 0.0, double(texels.size())));
-    };
-    const int first = column(on.x - on.half_x), end = column(on.x + on.half_x);
-    if (first >= end) return;
-    shade_row(texture, {.first = float((first + 0.5 - on.x) / on.half_x), .step = float(1 / on.half_x)},
-              float((row + 0.5 - on.y) / on.half_y), on.opacity,
-              texels.subspan(std::size_t(first), std::size_t(end - first)));
+    while (on.level + 1 < unsigned{kBillboardLevels} && texels_per_texel > double(1u << on.level) * 1.4142) ++on.level;
+    return on;
 }
 
 void BillboardShade::cast(const ShadowFrame& frame, int size, std::span<float> shadow) const {
@@ -204,13 +191,19 @@ void BillboardShade::cast(const ShadowFrame& frame, int size, std::span<float> s
         for (int b = on.first_row / kRowsAtOnce; b * kRowsAtOnce < on.end_row; ++b)
             of_block[std::size_t(b)].push_back(std::uint32_t(i));
     }
+    const BillboardTexels& textures = billboard_texels(pictures_.get());
     tbb::parallel_for(0, blocks, [&](int b) {
         for (const std::uint32_t i : of_block[std::size_t(b)]) {
             const Footprint& on = footprints[i];
+            if (on.first_column >= on.end_column) continue;
+            const TurnedTexture texture(textures, on.level, casters_[i].layer, casters_[i].turn);
+            const PlacesInRow places{.first = float((on.first_column + 0.5 - on.x) / on.half_x),
+                                     .step = float(1 / on.half_x)};
             const int end = std::min(on.end_row, (b + 1) * kRowsAtOnce);
             for (int row = std::max(on.first_row, b * kRowsAtOnce); row < end; ++row)
-                cast_row(casters_[i], on, row,
-                         shadow.subspan(std::size_t(row) * std::size_t(size), std::size_t(size)));
+                shade_row(texture, places, float((row + 0.5 - on.y) / on.half_y), on.opacity,
+                          shadow.subspan(std::size_t(row) * std::size_t(size) + std::size_t(on.first_column),
+                                         std::size_t(on.end_column - on.first_column)));
         }
     });
 }

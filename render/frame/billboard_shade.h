@@ -60,6 +60,7 @@ class BillboardShade {
         double u = 0, v = 0, s = 0;         // metres: right, up, along the light
         float half_u = 1, half_v = 1;       // metres
         float half_chord = 1;               // along the light
+        float half_height = 1;              // of the ellipsoid
         float opacity = 1;                  // 0..1
         std::uint16_t layer = 0, turn = 0;  // of BillboardPicture
         std::uint32_t cloud = 0;
@@ -69,7 +70,6 @@ class BillboardShade {
 
     void add(std::span<const CloudBillboard> billboards);
     void bin();
-    void cast_row(const Caster& caster, const Footprint& on, int row, std::span<float> texels) const;
     Footprint footprint(const Caster& caster, const ShadowFrame& frame, int size) const;
 
     Vec3 to_sun_{0, 0, 1}, right_{1, 0, 0}, up_{0, 1, 0};
