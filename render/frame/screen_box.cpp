@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 
 #include <tbb/parallel_for.h>
 
@@ -80,9 +79,9 @@ PixelBox screen_box(const shader::ViewBillboard& billboard, const Screen& screen
 std::vector<std::uint32_t> splats_near_to_far(const ViewSortedSplats& order) {
     std::vector<std::uint32_t> splats(order.balls.size() + order.billboards.size());
     std::size_t next = 0;
-    for (const Run& run : order.runs | std::views::reverse) {
-        const std::uint32_t kind = run.kind == SplatKind::billboard ? kBillboardSplat : 0;
-        for (std::uint32_t i = run.end; i-- > run.begin;) splats[next++] = i | kind;
+    for (auto run = order.runs.rbegin(); run != order.runs.rend(); ++run) {
+        const std::uint32_t kind = run->kind == SplatKind::billboard ? kBillboardSplat : 0;
+        for (std::uint32_t i = run->end; i-- > run->begin;) splats[next++] = i | kind;
     }
     return splats;
 }

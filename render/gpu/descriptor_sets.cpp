@@ -109,7 +109,7 @@ std::vector<ShaderBinding> bindings_of(ShaderCode code) {
         if (ids.used.contains(id)) bindings.push_back({number, ids.type.at(id)});
     std::ranges::sort(bindings, {}, &ShaderBinding::number);
     // Blocks that name one buffer twice, as different types.
-    bindings.erase(std::ranges::unique(bindings).begin(), bindings.end());
+    bindings.erase(std::unique(bindings.begin(), bindings.end()), bindings.end());
     return bindings;
 }
 

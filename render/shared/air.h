@@ -61,7 +61,10 @@ NEPHOS_FUNCTION Real3 clear_air(Real3 ray, Real distance) { return exp(-air_dept
 NEPHOS_FUNCTION Real3 air_source(Real3 ray, Real distance) {
     if (!kPhysicalSky) return rgb(frame.horizon);
     Real cosine = (1.0f / kAirAzimuth) * beside_sun(ray), square = cosine * cosine;
-    Real3 around = Real3(0.5f * (square + cosine), 1.0f - square, 0.5f * (square - cosine));
+    Real3 around;
+    around.x = 0.5f * (square + cosine);
+    around.y = 1.0f - square;
+    around.z = 0.5f * (square - cosine);
     Real3 light = light_of_air(air_column(ray, distance), air_upwards(ray), around,
                                particle_phase(dot(xyz(frame.to_sun), ray), frame.air.y));
     return max(light, Real(0.0f));

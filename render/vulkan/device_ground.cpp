@@ -167,7 +167,8 @@ const Pipeline& GroundPipelines::of(const GroundKinds& kinds) {
     const bool all[] = {kinds.sea, kinds.country, kinds.lying, kinds.mirror};
     for (std::uint32_t n = 0; n < std::size(all); ++n) constants.push_back({11 + n, all[n]});
     const ShaderCode code = kinds.march ? shaders().march_ground_comp : shaders().view_ground_comp;
-    return made_.emplace_back(std::make_unique<Made>(kinds, create_compute_pipeline(gpu_, code, constants)))->pipeline;
+    auto made = std::make_unique<Made>(Made{kinds, create_compute_pipeline(gpu_, code, constants)});
+    return made_.emplace_back(std::move(made))->pipeline;
 }
 
 }  // namespace nephos
