@@ -59,10 +59,10 @@ NEPHOS_CONST uint kNodeEdge = 9u, kNodeWords = 729u;
 NEPHOS_CONST uint kMarchLightNodes = 5u, kMarchLightWords = 125u;
 NEPHOS_CONST uint kClearanceWords = 16u;
 NEPHOS_CONST uint kLargeNoiseWords = 2097152u;        // those of the small noise follow
-// Metaballs take over from rays between these footprints of a pixel, in cells of 40 m. Larger cells have larger bumps, and
-// their metaballs take over at footprints that are larger in proportion.
+// Metaballs take over from rays between these footprints of a pixel, in cells of 40 m: where they are smaller than a
+// pixel. Larger cells have larger bumps, and their metaballs take over at footprints that are larger in proportion.
 NEPHOS_CONST float kFootprintCell_m = 40.0f;
-NEPHOS_CONST float kMarchedFootprint_m = 15.0f, kSplattedFootprint_m = 25.0f;
+NEPHOS_CONST float kMarchedFootprint_m = 60.0f, kSplattedFootprint_m = 100.0f;
 
 // Returns the weight of metaballs whose pixels have a footprint: 0 to 1, without a step.
 NEPHOS_FUNCTION float splatted_weight(float footprint_m) {
