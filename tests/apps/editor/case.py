@@ -55,7 +55,7 @@ class Case(unittest.TestCase):
             command = ["env", f"DISPLAY={screen.display}", *command]
         return command
 
-    def edit(self, *arguments, status=0, environment=None, timeout=240, **call):
+    def edit(self, *arguments, status=0, environment=None, timeout=540, **call):
         """Runs the editor; returns what it printed. A hang ends it after `timeout` seconds."""
         done = subprocess.run(self.command(*arguments, **call), capture_output=True, text=True, timeout=timeout,
                               cwd=self.folder, env={**self.environment, **(environment or {})}, check=False)
