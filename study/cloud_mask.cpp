@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "statistics/clouds.h"
+#include "study/cloud_mask_axes.h"
 #include "study/netcdf_file.h"
 #include "study/snapshot.h"
 #include <fmt/format.h>
@@ -34,6 +35,12 @@ double cell_size(const std::filesystem::path& path, const MaskOptions& options) 
     return *options.cell_size_m;
 }
 
+void require_no_height(const std::filesystem::path& path, const MaskOptions& options) {
+    if (options.level_height_m)
+        fail(ErrorCode::usage, path,
+             "is a view from above without levels: leave out --level-height (level_height_m of a target)");
+}
+
 // `value(i, j, k)` is cloud where it is above the threshold.
 template <typename Value>
 BitPlane plane_of(const Extent& extent, double threshold, Value&& value) {
@@ -55,7 +62,7 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
              fmt::format("has voxels of {} m itself: leave out the size of cells and levels", size));
     const std::vector<float> values = grid.to_dense();
     const Extent extent = grid.extent();
-    CloudMasks masks{{}, size, size, grid.placement().origin_m.z, options.boundaries, 0};
+    CloudMasks masks{{}, size, size, grid.placement().origin_m.z, options.boundaries, false, 0, {}};
     masks.snapshots.push_back(plane_of(extent, options.threshold.value_or(0), [&](int i, int j, int k) {
         return double(values[linear_index(extent, i, j, k)]);
     }));
@@ -64,32 +71,34 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
 
 CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions& options) {
     const NetcdfSource source(path, options.variable);
-    std::vector<std::uint64_t> sizes = source.sizes();
-    if (sizes.size() < 2 || sizes.size() > 4)
-        fail(ErrorCode::usage, path,
-             fmt::format("the variable has {} dimensions; expected (y, x), (z, y, x) or (time, z, y, x)",
-                         sizes.size()));
-    // Of three dimensions the first is time where its name says so.
-    const std::string& first = source.dimensions().front();
-    const bool has_time = sizes.size() == 4 || (sizes.size() == 3 && (first == "time" || first == "t"));
-    const std::uint64_t times = has_time ? sizes.front() : 1;
-    if (has_time) sizes.erase(sizes.begin());
-    if (sizes.size() == 2) sizes.insert(sizes.begin(), 1);
+    const MaskAxes axes = mask_axes(path, source);
+    std::vector<std::uint64_t> sizes;
+    for (const NetcdfAxis& axis : source.axes()) sizes.push_back(axis.size);
+    const std::uint64_t times = axes.has_time ? sizes.front() : 1;
+    if (axes.has_time) sizes.erase(sizes.begin());
+    if (!axes.has_levels) sizes.insert(sizes.begin(), 1);
     for (const std::uint64_t size : sizes)
         if (size > std::uint64_t(kMaxExtent))
             fail(ErrorCode::usage, path,
                  fmt::format("has {} cells along an axis; at most {} can be read", size, kMaxExtent));
     const Extent extent{int(sizes[2]), int(sizes[1]), int(sizes[0])};
     const double size = cell_size(path, options);
-    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries, 0};
+    if (!axes.has_levels) require_no_height(path, options);
+    const bool is_flat = !axes.has_levels || (extent.z == 1 && !options.level_height_m);
+    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries, is_flat, 0, {}};
+    if (!axes.note.empty()) masks.notes.push_back(axes.note);
+    if (axes.downwards)
+        masks.notes.push_back(
+            fmt::format("the levels of the variable {} go downwards, and are turned over", source.name()));
     // Row by row: as bits the masks are a small part of their values.
     const double threshold = options.threshold.value_or(0);
     std::vector<double> row(sizes[2]);
     std::uint64_t at = 0;
     for (std::uint64_t time = 0; time < times; ++time) {
         BitPlane& plane = masks.snapshots.emplace_back(extent);
-        for (int k = 0; k < extent.z; ++k)
+        for (int level = 0; level < extent.z; ++level)
             for (int j = 0; j < extent.y; ++j) {
+                const int k = axes.downwards ? extent.z - 1 - level : level;
                 source.read(at, row);
                 at += row.size();
                 for (int i = 0; i < extent.x; ++i) {
@@ -99,12 +108,16 @@ CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions
                 }
             }
     }
+    if (masks.missing > 0)
+        masks.notes.push_back(fmt::format("{} of {} values are missing, and count as clear", masks.missing,
+                                          times * extent.cells()));
     return masks;
 }
 
 CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& options) {
     if (!options.variable.empty()) fail(ErrorCode::usage, path, "a picture has no variables");
     const double size = cell_size(path, options);
+    require_no_height(path, options);
     // Deflate makes at most 1,032 bytes of one, and a pixel has at least a bit: a header that claims more lies.
     constexpr std::uint64_t kMostPixels = std::uint64_t(1) << 30, kPixelsOfByte = 8 * 1040;
     require_regular_file(path);
@@ -138,7 +151,7 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
     std::vector<png_byte> pixels(extent.cells());
     if (png_image_finish_read(&image, nullptr, pixels.data(), png_int_32(image.width), nullptr) == 0)
         fail(ErrorCode::io, path, image.message);
-    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries, 0};
+    CloudMasks masks{{}, size, size, 0, options.boundaries, true, 0, {}};
     masks.snapshots.push_back(plane_of(
         extent, options.threshold.value_or(kGreyThreshold),
         [&](int i, int j, int) { return double(pixels[linear_index(extent, i, extent.y - 1 - j, 0)]); }));
@@ -184,7 +197,41 @@ struct OrganisationSums {
     Organisation mean() const { return {iorg / n, scai / n, cop / n}; }  // NaN of none
 };
 
+// Notes that several files share, each once: "a.nc and 3 more: ...".
+class Notes {
+  public:
+    void add(const std::filesystem::path& path, const std::vector<std::string>& texts) {
+        for (const std::string& text : texts) {
+            const auto known = std::ranges::find(notes_, text, &Note::text);
+            if (known == notes_.end())
+                notes_.push_back({text, path.string(), 0});
+            else
+                ++known->more;
+        }
+    }
+    std::vector<std::string> texts() const {
+        std::vector<std::string> all;
+        for (const Note& note : notes_)
+            all.push_back(fmt::format("{}{}: {}", note.file,
+                                      note.more > 0 ? fmt::format(" and {} more", note.more) : "",
+                                      note.text));
+        return all;
+    }
+
+  private:
+    struct Note {
+        std::string text, file;
+        std::size_t more;
+    };
+    std::vector<Note> notes_;
+};
+
 }  // namespace
+
+bool needs_levels(std::string_view statistic) {
+    return statistic == "cloud_fraction" || statistic == "base_mean_m" || statistic == "top_mean_m" ||
+           statistic == "overlap";
+}
 
 CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const MaskOptions& options) {
     for (const auto& [value, name] : {std::pair(options.cell_size_m, "cell size"),
@@ -192,8 +239,10 @@ CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const Mas
         if (value && !(*value > 0 && std::isfinite(*value)))
             throw Error(ErrorCode::usage, fmt::format("a {} of {} m: must be above 0", name, *value));
     CloudMasks all;
+    Notes notes;
     for (const std::filesystem::path& path : paths) {
         CloudMasks one = read_mask(path, options);
+        notes.add(path, one.notes);
         if (all.snapshots.empty()) {
             all = std::move(one);
             continue;
@@ -203,9 +252,11 @@ CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const Mas
             fail(ErrorCode::usage, path,
                  "has another number of cells or another cell size than the masks before it");
         all.missing += one.missing;
+        all.seen_from_above = all.seen_from_above || one.seen_from_above;
         std::ranges::move(one.snapshots, std::back_inserter(all.snapshots));
     }
     if (all.snapshots.empty()) throw Error(ErrorCode::usage, "no cloud mask is named");
+    all.notes = notes.texts();
     return all;
 }
 
@@ -236,9 +287,11 @@ MaskStatistics mask_statistics(const CloudMasks& masks) {
         sums.add(organisation(clouds_2d(plane.view(), masks.boundaries), extent, masks.boundaries));
     }
     MaskStatistics result;
-    for (std::size_t n = 0; n < kStatistics.size(); ++n)
-        result.statistics[n] =
-            series[n].empty() ? SeriesMean{kNaN, kNaN, kNaN, kNaN, kNaN} : mean_of(series[n]);
+    for (std::size_t n = 0; n < kStatistics.size(); ++n) {
+        const bool is_known =
+            !series[n].empty() && !(masks.seen_from_above && needs_levels(kStatistics[n].name));
+        result.statistics[n] = is_known ? mean_of(series[n]) : SeriesMean{kNaN, kNaN, kNaN, kNaN, kNaN};
+    }
     for (const std::string_view name : {"size_exponent", "size_exponent_line", "fractal_dimension"})
         result.statistics[statistic_index(name)] = size_statistic(name, sizes);
     result.organisation = sums.mean();

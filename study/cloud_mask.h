@@ -5,14 +5,19 @@
 // of a study, so that they can be the targets of a fit.
 //
 //     .vdb    a float grid above the threshold, or a bool or mask grid; voxel size and heights are those of the file
-//     .nc     NetCDF classic (nccopy -k classic makes one of NetCDF-4): a variable over (time), (z,) y, x, the last
-//             fastest; z upwards, y north. Several times are several snapshots. Values are unpacked, and missing ones (NaN,
+//     .nc     NetCDF classic (nccopy -k classic makes one of NetCDF-4): a variable over (time,) (z,) y, x, the last
+//             fastest, as their CF attributes and names tell (cloud_mask_axes.h); levels of a coordinate that tells that they
+//             go downwards are turned over. Several times are several snapshots. Values are unpacked, and missing ones (NaN,
 //             _FillValue, missing_value, outside valid_range) are clear, and counted
-//     .png    grey, seen from above, north up; one level; at most 2^30 pixels
+//     .png    grey, seen from above, north up; at most 2^30 pixels
+//
+// A picture, and a variable without levels or with one whose height is not given, is a view from above: what needs a vertical
+// has no value.
 
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "statistics/organisation.h"
@@ -35,15 +40,21 @@ struct CloudMasks {
     std::vector<BitPlane> snapshots;                         // all of one extent, in the order of time
     double cell_size_m = 0, level_height_m = 0, base_m = 0;  // base_m: lower face of the lowest level
     Boundaries boundaries;
-    std::uint64_t missing = 0;  // values of all snapshots that are missing, and count as clear
+    bool seen_from_above = false;  // the one level stands for all of them
+    std::uint64_t missing = 0;     // values of all snapshots that are missing, and count as clear
+    // Each with the file, or the first of several, that it is about: missing values, dimensions taken by their places.
+    std::vector<std::string> notes;
 };
+
+// Returns whether a statistic has no value in a view from above.
+bool needs_levels(std::string_view statistic);
 
 // Reads the masks of one or several files, one after the other. Throws Error(usage) on options that contradict the file or
 // are missing, and when files differ in extent or cell size, Error(io) when one cannot be read.
 CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const MaskOptions& options);
 
 struct MaskStatistics {
-    // In the order of kStatistics; NaN where a mask has none (act, hum, lifetime, period). Errors: of the mean over
+    // In the order of kStatistics; NaN where a mask has none (act, hum, lifetime, period), or a view from above. Errors: of the mean over
     // the snapshots, sd sqrt(tau / n); NaN of a single one. Of exponents and dimension: of the fit.
     std::array<SeriesMean, kStatistics.size()> statistics;
     Organisation organisation;  // mean over the snapshots with two clouds or more

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -41,6 +42,15 @@ struct NetcdfVariable {
 void write_netcdf(const std::filesystem::path& path, const std::vector<NetcdfDimension>& dimensions,
                   const NetcdfAttributes& attributes, const std::vector<NetcdfVariable>& variables);
 
+// A dimension of a variable, and what its coordinate variable, the one-dimensional one of the same name, says of it (CF
+// conventions); texts are empty where there is none or it does not say.
+struct NetcdfAxis {
+    std::string name;
+    std::uint64_t size = 0;
+    std::string axis, standard_name, units, positive;
+    std::optional<double> first, last;  // its first and last value; not of records
+};
+
 // A variable of a file of others, CDF-1, CDF-2 or CDF-5, whose values are taken a piece at a time: as doubles they are up to
 // eight times the file.
 class NetcdfSource {
@@ -53,8 +63,8 @@ class NetcdfSource {
     NetcdfSource(NetcdfSource&&) noexcept;
     NetcdfSource& operator=(NetcdfSource&&) noexcept;
 
-    const std::vector<std::string>& dimensions() const;
-    const std::vector<std::uint64_t>& sizes() const;
+    const std::string& name() const;
+    const std::vector<NetcdfAxis>& axes() const;
     // Takes the values from place `first` on, the last dimension fastest. Unpacked: times scale_factor plus add_offset. NaN:
     // missing, that is _FillValue (or the usual one of the type where the file names none), one of missing_value, or outside
     // valid_range, valid_min or valid_max. Whole numbers whose attribute _Unsigned is "true" are unsigned, and so are fill and

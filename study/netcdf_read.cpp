@@ -316,6 +316,58 @@ Reader opened(const std::filesystem::path& path) {
     return {path, read_beginning(path, error ? 4096 : std::size_t(file_bytes))};
 }
 
+// The one of that name; without a name the only one with two dimensions or more.
+const FoundVariable& variable_named(const std::vector<FoundVariable>& variables, const std::string& name,
+                                    const std::filesystem::path& path) {
+    const auto fail = [&](const std::string& message) {
+        throw Error(ErrorCode::io, path.string() + ": " + message);
+    };
+    std::vector<std::string> names;
+    const FoundVariable* found = nullptr;
+    for (const FoundVariable& variable : variables) {
+        if (variable.dimensions.size() >= 2) names.push_back(variable.name);
+        if (name.empty() ? variable.dimensions.size() >= 2 && names.size() == 1 : variable.name == name)
+            found = &variable;
+    }
+    const std::string listed = fmt::format("{}", fmt::join(names, ", "));
+    if (found == nullptr && names.empty()) fail("has no variable with two or more dimensions");
+    if (found == nullptr)
+        fail(fmt::format("has no variable {}; those with two or more dimensions are {}", name, listed));
+    if (name.empty() && names.size() > 1)
+        fail(fmt::format("has several variables: name one with --variable (`variable` of a target) of {}",
+                         listed));
+    if (found->dimensions.empty())
+        fail(fmt::format("the variable {} is a single number without dimensions", found->name));
+    return *found;
+}
+
+// A dimension with what its coordinate variable says. Values that lie beyond the end of the file are left out: no
+// other value depends on them.
+NetcdfAxis axis_of(const Reader& reader, const std::vector<FoundVariable>& variables, std::uint64_t dimension,
+                   const NetcdfDimension& named, const std::filesystem::path& path) {
+    NetcdfAxis axis{named.name, named.size, {}, {}, {}, {}, {}, {}};
+    const auto coordinate = std::ranges::find_if(variables, [&](const FoundVariable& variable) {
+        return variable.name == named.name && variable.dimensions == std::vector{dimension};
+    });
+    if (coordinate == variables.end()) return axis;
+    for (const auto& [name, to] :
+         {std::pair("axis", &axis.axis), std::pair("standard_name", &axis.standard_name),
+          std::pair("units", &axis.units), std::pair("positive", &axis.positive)}) {
+        const auto attribute = coordinate->attributes.find(name);
+        if (attribute == coordinate->attributes.end()) continue;
+        *to = attribute->second.text;
+        while (!to->empty() && (to->back() == '\0' || to->back() == ' ')) to->pop_back();
+    }
+    if (named.size == 0 || coordinate->type == kCharacters) return axis;
+    const std::uint64_t bytes = size_of_type(coordinate->type, path), all = named.size * bytes;
+    if (named.size > reader.size() || coordinate->begin > reader.size() ||
+        all > reader.size() - coordinate->begin)
+        return axis;
+    axis.first = value_at(reader, coordinate->begin, coordinate->type);
+    axis.last = value_at(reader, coordinate->begin + all - bytes, coordinate->type);
+    return axis;
+}
+
 }  // namespace
 
 struct NetcdfSource::Variable {
@@ -323,8 +375,7 @@ struct NetcdfSource::Variable {
     Reader reader;
     FoundVariable found;
     std::optional<Packing> packing;
-    std::vector<std::string> dimensions;
-    std::vector<std::uint64_t> sizes;
+    std::vector<NetcdfAxis> axes;
     bool is_record = false;
     std::uint64_t in_record = 1, record_bytes = 0;
 };
@@ -333,11 +384,11 @@ NetcdfSource::~NetcdfSource() = default;
 NetcdfSource::NetcdfSource(NetcdfSource&&) noexcept = default;
 NetcdfSource& NetcdfSource::operator=(NetcdfSource&&) noexcept = default;
 
-const std::vector<std::string>& NetcdfSource::dimensions() const { return variable_->dimensions; }
-const std::vector<std::uint64_t>& NetcdfSource::sizes() const { return variable_->sizes; }
+const std::string& NetcdfSource::name() const { return variable_->found.name; }
+const std::vector<NetcdfAxis>& NetcdfSource::axes() const { return variable_->axes; }
 
 NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string& name)
-    : variable_(new Variable{path, opened(path), {}, {}, {}, {}}) {
+    : variable_(new Variable{path, opened(path), {}, {}, {}}) {
     Reader& reader = variable_->reader;
     const std::uint64_t records = reader.count();
     std::vector<NetcdfDimension> dimensions;
@@ -367,28 +418,15 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
             ++record_variables;
         }
     }
-    std::vector<std::string> names;
-    const FoundVariable* found = nullptr;
-    for (const FoundVariable& variable : variables) {
-        if (variable.dimensions.size() >= 2) names.push_back(variable.name);
-        if (name.empty() ? variable.dimensions.size() >= 2 && names.size() == 1 : variable.name == name)
-            found = &variable;
-    }
-    if (found == nullptr || (name.empty() && names.size() > 1))
-        throw Error(
-            ErrorCode::io,
-            fmt::format("{}: name one of its variables with two or more dimensions, as in {}#NAME: {}",
-                        path.string(), path.filename().string(), fmt::join(names, ", ")));
-    if (found->dimensions.empty())
-        throw Error(ErrorCode::io, fmt::format("{}: the variable {} is a single number without dimensions",
-                                               path.string(), found->name));
+    const FoundVariable* found = &variable_named(variables, name, path);
     Variable& data = *variable_;
     std::uint64_t count = 1;
     for (std::size_t n = 0; n < found->dimensions.size(); ++n) {
         const NetcdfDimension& dimension = dimensions[found->dimensions[n]];
         const std::uint64_t size = dimension.size == 0 ? records : dimension.size;
-        data.dimensions.push_back(dimension.name);
-        data.sizes.push_back(size);
+        data.axes.push_back(
+            axis_of(reader, variables, found->dimensions[n], {dimension.name, dimension.size}, path));
+        data.axes.back().size = size;
         if (size == 0 || count > reader.size() / size)
             throw Error(ErrorCode::io, path.string() + ": is damaged or empty");
         count *= size;
@@ -417,10 +455,15 @@ void NetcdfSource::read(std::uint64_t first, std::span<double> values) const {
 
 NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& name) {
     const NetcdfSource source(path, name);
+    NetcdfData data;
     std::uint64_t count = 1;
-    for (const std::uint64_t size : source.sizes()) count *= size;
+    for (const NetcdfAxis& axis : source.axes()) {
+        count *= axis.size;
+        data.dimensions.push_back(axis.name);
+        data.sizes.push_back(axis.size);
+    }
     require_memory(std::size_t(count) * sizeof(double), path.string() + ": its values");
-    NetcdfData data{source.dimensions(), source.sizes(), std::vector<double>(count)};
+    data.values.resize(count);
     source.read(0, data.values);
     return data;
 }

@@ -49,14 +49,16 @@ nlohmann::ordered_json json_of(const CloudMasks& masks, const MaskStatistics& fo
     nlohmann::ordered_json statistics = nlohmann::ordered_json::object();
     for (std::size_t n = 0; n < kStatistics.size(); ++n) {
         const SeriesMean& s = found.statistics[n];
-        if (std::isfinite(s.mean))
-            statistics[std::string(kStatistics[n].name)] = {
-                {"mean", s.mean}, {"se", value(s.error)}, {"sd", value(s.deviation)}};
+        statistics[std::string(kStatistics[n].name)] = {
+            {"mean", value(s.mean)}, {"se", value(s.error)}, {"sd", value(s.deviation)}};
     }
     const Extent extent = masks.snapshots.front().extent();
     return {{"snapshots", masks.snapshots.size()},
             {"cells", {extent.x, extent.y, extent.z}},
             {"cell_size_m", masks.cell_size_m},
+            {"level_height_m",
+             masks.seen_from_above ? nlohmann::ordered_json() : nlohmann::ordered_json(masks.level_height_m)},
+            {"seen_from_above", masks.seen_from_above},
             {"missing_values", masks.missing},
             {"statistics", statistics},
             {"organisation", organisation(found.organisation)},
@@ -64,18 +66,31 @@ nlohmann::ordered_json json_of(const CloudMasks& masks, const MaskStatistics& fo
             {"organisation_random_sd", organisation(found.random.deviation)}};
 }
 
+// Why a mask has no value of a statistic.
+std::string_view why_none(const CloudMasks& masks, std::string_view statistic) {
+    if (statistic == "act_fraction" || statistic == "hum_fraction" || statistic == "lifetime_s" ||
+        statistic == "pulse_period_s")
+        return "none: of runs alone";
+    if (masks.seen_from_above && needs_levels(statistic)) return "none: a view from above has no levels";
+    if (statistic.starts_with("size_exponent") || statistic == "fractal_dimension")
+        return "none: too few clouds of different sizes";
+    return "none: not defined in every snapshot";
+}
+
 void print_table(const CloudMasks& masks, const MaskStatistics& found) {
     const Extent extent = masks.snapshots.front().extent();
     Output output;
-    output.line(fmt::format("{} snapshot{} of {} x {} x {} cells of {} m", masks.snapshots.size(),
-                            masks.snapshots.size() == 1 ? "" : "s", extent.x, extent.y, extent.z,
-                            number_text(masks.cell_size_m)));
+    output.line(fmt::format("{} snapshot{} of {} x {}{} cells of {} m", masks.snapshots.size(),
+                            masks.snapshots.size() == 1 ? "" : "s", extent.x, extent.y,
+                            masks.seen_from_above ? "" : fmt::format(" x {}", extent.z),
+                            number_text(masks.cell_size_m)) +
+                (masks.seen_from_above ? ", seen from above" : ""));
     output.line(fmt::format("{:22} {:>11} {:>10}  {}", "statistic", "mean", "se", "what it is"));
     for (std::size_t n = 0; n < kStatistics.size(); ++n) {
         const SeriesMean& s = found.statistics[n];
-        if (!std::isfinite(s.mean)) continue;
-        output.line(fmt::format("{:22} {:>11} {:>10}  {}", kStatistics[n].name, number(s.mean, 5),
-                                number(s.error, 2), kStatistics[n].definition));
+        const std::string_view name = kStatistics[n].name;
+        output.line(fmt::format("{:22} {:>11} {:>10}  {}", name, number(s.mean, 5), number(s.error, 2),
+                                std::isfinite(s.mean) ? kStatistics[n].definition : why_none(masks, name)));
     }
     output.line(fmt::format("{:22} {:>11} {:>10}  {}", "organisation", "value", "random",
                             "of random shadows of the same cover, their sd"));
@@ -91,10 +106,7 @@ void print_table(const CloudMasks& masks, const MaskStatistics& found) {
 int stats(const StatsArguments& a) {
     const CloudMasks masks =
         read_masks(std::vector<std::filesystem::path>(a.files.begin(), a.files.end()), a.mask);
-    if (masks.missing > 0)
-        print_note(
-            fmt::format("{} of {} values are missing, and count as clear", human_count(masks.missing),
-                        human_count(masks.snapshots.size() * masks.snapshots.front().extent().cells())));
+    for (const std::string& note : masks.notes) print_note(note);
     const MaskStatistics found = mask_statistics(masks);
     if (a.work.json)
         Output().line(json_text(json_of(masks, found)));

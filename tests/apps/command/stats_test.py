@@ -21,6 +21,9 @@ from fit_test import FIT, NULL
 from sweep_test import rows
 
 
+NONE = {"mean": None, "se": None, "sd": None}
+
+
 def random_mask(seed, shape, cover):
     return numpy.random.default_rng(seed).random(shape) < cover
 
@@ -55,8 +58,13 @@ class Stats(Case):
                                 ("edge_per_km", edges * size / 1000 / area_km2),
                                 ("base_mean_m", lowest.mean() * height), ("top_mean_m", highest.mean() * height)):
                 expected[name].append(value)
+        flat = masks.shape[1] == 1
+        self.assertEqual((found["seen_from_above"], found["level_height_m"]), (flat, None if flat else height))
         for name, values in expected.items():
             got = found["statistics"][name]
+            if flat and name in ("cloud_fraction", "base_mean_m", "top_mean_m"):
+                self.assertEqual(got, NONE, name)
+                continue
             self.assertTrue(math.isclose(got["mean"], numpy.mean(values), rel_tol=1e-9), name)
             if 1 < len(values) < 8:
                 self.assertTrue(math.isclose(got["se"], numpy.std(values, ddof=1) / math.sqrt(len(values)), rel_tol=1e-6,
@@ -76,6 +84,103 @@ class Stats(Case):
         text = self.call("stats", name, "--cell-size", "100").stdout
         self.assertIn("5 snapshots of 70 x 40 x 6 cells of 100 m", text)
         self.assertRegex(text, r"\niorg +\d")
+
+    def test_a_view_from_above_has_no_heights_and_no_fraction_of_cells(self):
+        """Nor has a variable of one level, unless its height is given."""
+        mask = random_mask(6, (1, 30, 50), 0.2)
+        Image.fromarray((mask[0] * 255).astype(numpy.uint8)).save(self.folder / "a.png")
+        self.netcdf("yx.nc", mask[0] * 1.0, ("y", "x"))
+        self.netcdf("zyx.nc", mask * 1.0, ("z", "y", "x"))
+        for name in ("a.png", "yx.nc", "zyx.nc"):
+            found = self.stats(name, "--cell-size", "20")
+            self.assertTrue(found["seen_from_above"], name)
+            self.assertAlmostEqual(found["statistics"]["cover"]["mean"], mask.mean())
+            for statistic in ("cloud_fraction", "base_mean_m", "top_mean_m", "overlap", "act_fraction", "lifetime_s"):
+                self.assertEqual(found["statistics"][statistic], NONE, (name, statistic))
+            text = self.call("stats", name, "--cell-size", "20").stdout
+            self.assertIn("1 snapshot of 50 x 30 cells of 20 m, seen from above", text)
+            self.assertRegex(text, r"\ncloud_fraction +- +-  none: a view from above has no levels\n")
+            self.assertRegex(text, r"\nsize_exponent_line +- +-  none: too few clouds")
+            self.assertRegex(text, r"\nlifetime_s +- +-  none: of runs alone\n")
+        for name in ("a.png", "yx.nc"):
+            self.refused(2, "stats", name, "--cell-size", "20", "--level-height", "40", says="leave out --level-height")
+        slab = self.stats("zyx.nc", "--cell-size", "20", "--level-height", "40")
+        self.assertEqual((slab["seen_from_above"], slab["statistics"]["top_mean_m"]["mean"]), (False, 40))
+
+    def test_every_statistic_has_a_place(self):
+        """Also where it has no value."""
+        self.netcdf("a.nc", random_mask(7, (3, 20, 30), 0.05) * 1.0, ("z", "y", "x"))
+        found = self.stats("a.nc", "--cell-size", "20")["statistics"]
+        self.assertEqual(len(found), 16)
+        self.assertEqual(found["size_exponent_line"], NONE)
+
+    def axes(self, name, values, dimensions, **coordinates):
+        """A variable with coordinate variables: their values and attributes."""
+        self.netcdf(name, values, dimensions)
+        with netcdf_file(self.folder / name, "a") as file:
+            for dimension, (numbers, attributes) in coordinates.items():
+                written = file.createVariable(dimension, "f8", (dimension,))
+                written[:] = numbers
+                for attribute, value in attributes.items():
+                    setattr(written, attribute, value)
+        return name
+
+    def test_axes_are_known_by_names_and_attributes(self):
+        masks = random_mask(8, (3, 5, 12, 20), 0.05)
+        size = ("--cell-size", "50", "--level-height", "20")
+        for number, dimensions in enumerate((("Time", "bottom_top", "south_north", "west_east"), ("TIME", "Lev", "lat", "lon"),
+                                             ("t", "height_2", "rlat", "rlon"), ("time", "zt", "yt", "xt"))):
+            result = self.call("stats", self.netcdf(f"{number}.nc", masks * 1.0, dimensions), *size, "--json")
+            self.assertEqual(result.stderr, "")
+            self.check(json.loads(result.stdout), masks, 50, 20)
+        # Three dimensions are not levels where the first is a time, however it is written.
+        for name in ("Time", "XTIME", "T"):
+            found = self.stats(self.netcdf("wrf.nc", masks[:, 0] * 1.0, (name, "south_north", "west_east")), *size[:2])
+            self.check(found, masks[:, :1], 50, 50)
+        # Attributes tell what names do not, and come before them.
+        for attributes in ({"axis": "T"}, {"standard_name": "time"}, {"units": "hours since 2020-01-01"}):
+            name = self.axes("cf.nc", masks[:, 0] * 1.0, ("z", "b", "c"), z=(range(3), attributes),
+                             b=(range(12), {"units": "degrees_north"}), c=(range(20), {"axis": "X"}))
+            result = self.call("stats", name, *size[:2], "--json")
+            self.assertEqual(result.stderr, "")
+            self.check(json.loads(result.stdout), masks[:, :1], 50, 50)
+        # Unknown ones are taken by their places, and that is said.
+        result = self.call("stats", self.netcdf("abc.nc", masks[0] * 1.0, ("a", "b", "c")), *size, "--json")
+        self.check(json.loads(result.stdout), masks[:1], 50, 20)
+        self.assertIn("note: abc.nc: the dimensions (a, b, c) of the variable ql are taken as z, y, x by their places",
+                      result.stderr)
+        again = self.netcdf("abd.nc", masks[0] * 1.0, ("a", "b", "c"))
+        result = self.call("stats", "abc.nc", again, *size)
+        self.assertEqual(result.stderr.count("note:"), 1)
+        self.assertIn("abc.nc and 1 more: the dimensions", result.stderr)
+
+    def test_another_order_of_axes_is_refused_with_its_cure(self):
+        mask = random_mask(9, (5, 12, 20), 0.05) * 1.0
+        size = ("--cell-size", "50")
+        self.refused(2, "stats", self.netcdf("yxz.nc", mask.transpose(1, 2, 0), ("y", "x", "z")), *size,
+                     says="yxz.nc: the dimensions (y, x, z) of the variable ql are y, x, z; expected (time,) (z,) y, x, the last "
+                          "fastest: `ncpdq -a z,y,x IN.nc OUT.nc` reorders them")
+        self.refused(2, "stats", self.netcdf("lonlat.nc", mask[0].T, ("lon", "lat")), *size, says="ncpdq -a lat,lon")
+        self.refused(2, "stats", self.netcdf("ztyx.nc", mask[None].transpose(1, 0, 2, 3), ("lev", "time", "y", "x")), *size,
+                     says="ncpdq -a time,lev,y,x")
+        self.refused(2, "stats", self.netcdf("section.nc", mask[0], ("z", "x")), *size, says="are z, x; expected")
+        self.refused(2, "stats", self.netcdf("five.nc", mask[None, None], ("time", "member", "z", "y", "x")), *size,
+                     says="has 5 dimensions (time, member, z, y, x); expected")
+        name = self.axes("attributes.nc", mask, ("a", "b", "c"), a=(range(5), {"axis": "Y"}), c=(range(20), {"axis": "Z"}))
+        self.refused(2, "stats", name, *size, says="are y, unknown, z; expected")
+
+    def test_levels_that_go_downwards_are_turned_over(self):
+        mask = random_mask(10, (1, 6, 12, 20), 0.03)
+        size = ("--cell-size", "50", "--level-height", "20")
+        rising, falling = numpy.arange(6.0), numpy.arange(6.0)[::-1]
+        for down, attributes, values in ((False, {"units": "m"}, rising), (True, {"units": "m"}, falling),
+                                         (True, {"units": "hPa"}, rising), (False, {"units": "Pa"}, falling),
+                                         (True, {"positive": "down"}, rising), (False, {"positive": "up", "units": "hPa"}, rising)):
+            stored = mask[0, ::-1] if down else mask[0]
+            name = self.axes("z.nc", stored * 1.0, ("lev", "y", "x"), lev=(values, attributes))
+            result = self.call("stats", name, *size, "--json")
+            self.check(json.loads(result.stdout), mask, 50, 20)
+            self.assertEqual("z.nc: the levels of the variable ql go downwards, and are turned over" in result.stderr, down)
 
     def test_values_that_are_missing_are_no_cloud(self):
         """Of 30 x 50 values every fifth is cloud, and 7 columns are missing, by each way to say so."""
@@ -116,7 +221,7 @@ class Stats(Case):
                 found = json.loads(result.stdout)
                 self.assertAlmostEqual(found["statistics"]["cover"]["mean"], cover, places=9)
                 self.assertEqual(found["missing_values"], 210)
-                self.assertIn("210 of 1500 values are missing", result.stderr.replace(",", ""))
+                self.assertIn(f"note: {name}: 210 of 1500 values are missing", result.stderr)
         for attributes, says in (({"valid_range": numpy.array([0.0])}, "valid_range of the variable ql has 1 values: expected 2"),
                                  ({"valid_range": numpy.array([2.0, 1.0])}, "valid_range of the variable ql is empty"),
                                  ({"scale_factor": "two"}, "scale_factor of the variable ql is a text: expected a number"),
@@ -208,7 +313,13 @@ class Stats(Case):
         self.refused(2, "stats", name, "--cell-size", "5", "--periodic", "z", says="'z' is not one of x, y and xy")
         self.refused(2, "stats", self.scene, says="expected .vdb, .nc or .png")
         self.refused(3, "stats", "none.png", "--cell-size", "5", says="none.png")
-        self.refused(3, "stats", name, "--cell-size", "5", "--variable", "qc", says="ql")
+        self.refused(3, "stats", name, "--cell-size", "5", "--variable", "qc",
+                     says="a.nc: has no variable qc; those with two or more dimensions are ql")
+        self.netcdf("two.nc", numpy.zeros((4, 5)), ("y", "x"))
+        with netcdf_file(self.folder / "two.nc", "a") as file:
+            file.createVariable("qi", "f4", ("y", "x"))[:] = 0
+        self.refused(3, "stats", "two.nc", "--cell-size", "5",
+                     says="two.nc: has several variables: name one with --variable (`variable` of a target) of ql, qi")
         self.write("text.png", "not a picture")
         self.refused(3, "stats", "text.png", "--cell-size", "5", says="text.png")
         self.call("state", self.scene, "--steps", "1", "--out", "state.vdb")
