@@ -27,7 +27,7 @@ struct TwoSampleLight {
 
 struct VeilView {
     VeilLighting light = VeilLighting::physical;
-    int samples = 48;        // of a ray, at most; 4..256
+    int samples = 48;        // steps of a ray, at most; 4..256; those where the veil is dense are divided
     int finer_octaves = 3;   // after those of the veil, 0..12; pictures fade what a pixel does not resolve
     bool to_horizon = true;  // false: the veil ends with its lattice
     // Factor of the density by height, S's g(x) = a x + b for x = -1/2 at the base and 1/2 at the top; not below 0.

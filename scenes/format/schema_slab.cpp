@@ -58,7 +58,8 @@ const Section& slab_section() {
              "`physical`: scattered once, and often as in a level sheet. `two_samples`: S's light, "
              "with constants of taste.",
              kLightSource),
-         key<&VeilView::samples>("samples", "", between(4, 256), "Samples of a ray, at most."),
+         key<&VeilView::samples>("samples", "", between(4, 256),
+                                "Steps of a ray, at most; those where the veil is dense are divided."),
          key<&VeilView::finer_octaves>(
              "finer_octaves", "", between(0, 12),
              "Octaves after those of the veil, by its `lacunarity` and `persistence`: they "
