@@ -32,8 +32,9 @@ struct FitParameter {
 struct FitTarget {
     std::string statistic;  // of kStatistics
     double value = 0, sd = 0;
-    std::uint64_t missing =
-        0;  // values of the cloud mask it is from that are missing, and were taken as clear
+    std::string from = {};  // the cloud mask that the value is of; empty of a number
+    // Values of that mask that are missing, and were taken as clear.
+    std::uint64_t missing = 0;
 };
 
 struct FitProblem {
@@ -102,8 +103,11 @@ double parameter_value(const FitParameter& parameter, double unit);
 struct FitOptions {
     SweepOptions base;  // scene, steps, overrides; no axes
     FitProblem problem;
+    std::vector<std::string> notes;  // what is worth a look of the masks of targets: their sizes, missing values
 };
-// Reads one; `runs` in place of those that it asks for. Throws SceneErrors naming line and column, and Error(io).
+// Reads one, its scene and its masks; `runs` in place of those that it asks for. Checks ends of priors and values of targets, and
+// that the cells and the box of a mask are those of the scene where its statistic depends on them. Throws SceneErrors
+// naming line and column, and Error(io).
 FitOptions read_fit_file(const std::filesystem::path& path, std::optional<std::uint64_t> runs = {});
 
 }  // namespace nephos

@@ -112,15 +112,18 @@ void write_results(const FitOptions& options, const FitResult& result, const std
     }
     for (std::size_t n = 0; n < result.targets.size(); ++n) {
         const TargetCheck& t = result.targets[n];
-        targets.push_back({{"statistic", options.problem.targets[n].statistic},
-                           {"target", t.target},
-                           {"sd", t.sd},
-                           {"predicted", number(t.predicted)},
-                           {"predicted_sd", number(t.predicted_sd)},
-                           {"got", number(t.got)},
-                           {"got_se", number(t.got_error)},
-                           {"got_runs", t.got_runs},
-                           {"missing", options.problem.targets[n].missing}});
+        targets.push_back(
+            {{"statistic", options.problem.targets[n].statistic},
+             {"target", t.target},
+             {"sd", t.sd},
+             {"predicted", number(t.predicted)},
+             {"predicted_sd", number(t.predicted_sd)},
+             {"got", number(t.got)},
+             {"got_se", number(t.got_error)},
+             {"got_runs", t.got_runs},
+             {"from",
+              options.problem.targets[n].from.empty() ? Json() : Json(options.problem.targets[n].from)},
+             {"missing", options.problem.targets[n].missing}});
     }
     for (const Direction& direction : result.directions)
         directions.push_back({{"weights", direction.weights}, {"strength", number(direction.strength)}});
@@ -134,7 +137,8 @@ void write_results(const FitOptions& options, const FitResult& result, const std
                        {"effective_samples", number(result.effective_samples)},
                        {"parameters", parameters},
                        {"targets", targets},
-                       {"directions", directions}};
+                       {"directions", directions},
+                       {"notes", options.notes}};
     write_atomically(folder / "fit.json", json.dump(2) + "\n");
 }
 
@@ -209,10 +213,6 @@ std::string fit_text(const FitOptions& options, const FitResult& result) {
         text +=
             fmt::format("warning: {} of {} runs: no more points were found where the targets are possible\n",
                         result.runs, options.problem.runs);
-    for (const FitTarget& target : options.problem.targets)
-        if (target.missing > 0)
-            text += fmt::format("note: {} values of the mask of `{}` are missing, and count as clear\n",
-                                target.missing, target.statistic);
     if (result.lost > 0)
         text +=
             fmt::format("warning: {} of {} runs had no mean (not steady, dead or failed) and told nothing\n",

@@ -264,6 +264,13 @@ std::size_t statistic_index(std::string_view name) {
                             fmt::join(names, ", ")));
 }
 
+bool is_of_snapshots(std::string_view statistic) {
+    constexpr std::string_view kNames[] = {"clouds_per_km2",   "cloud_area_m2", "correlation_length_m",
+                                           "overlap",          "size_exponent", "size_exponent_line",
+                                           "fractal_dimension"};
+    return std::ranges::count(kNames, statistic) > 0;
+}
+
 RunResult run_for_statistics(const Scene& scene, const SweepOptions& options, bool with_thumbnail) {
     const StepRules& rules = options.steps;
     Measurement measurement(scene, options);

@@ -45,6 +45,9 @@ inline constexpr std::array<StatisticInfo, 16> kStatistics{{
 // Returns the place of a statistic in kStatistics. Throws Error(usage) that lists the names and says which was meant.
 std::size_t statistic_index(std::string_view name);
 
+// Returns whether a statistic is of snapshots, which `clouds_every` = 0 takes none of.
+bool is_of_snapshots(std::string_view statistic);
+
 // Values of every step that a run keeps, as 32-bit floats; NaN without value.
 struct SeriesInfo {
     std::string_view name, standard_name, unit, definition;

@@ -2,6 +2,7 @@
 #include "study/toml_table.h"
 
 #include <algorithm>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -34,6 +35,17 @@ std::string value_text(const Node& node) {
             break;
     }
     return {};
+}
+
+// " from 0 to 1"; ends that only say that a number is finite, or above 0, as words.
+std::string range_text(double min, double max) {
+    using Limits = std::numeric_limits<double>;
+    const std::string low = min == Limits::min()      ? " above 0"
+                            : min == Limits::lowest() ? ""
+                                                      : " from " + number_text(min);
+    const std::string high =
+        max == Limits::max() ? "" : (low.empty() ? " up to " : " to ") + number_text(max);
+    return low.starts_with(" from") && high.empty() ? low + " upwards" : low + high;
 }
 
 }  // namespace
@@ -73,6 +85,8 @@ void TomlTable::report(const std::string& key, const std::string& message, const
     document_.report(entry ? entry->value.place : node_.place, message, expected);
 }
 
+void TomlTable::report(Problem problem) { document_.problems.push_back(std::move(problem)); }
+
 bool TomlTable::has(std::string_view key) { return find(key) != nullptr; }
 
 std::optional<std::string> TomlTable::text(const std::string& key) {
@@ -88,7 +102,7 @@ std::optional<double> TomlTable::number(const std::string& key, double min, doub
     if (entry == nullptr) return std::nullopt;
     const bool whole = entry->value.kind == Node::Kind::integer;
     const double value = whole ? double(entry->value.integer) : entry->value.number;
-    const std::string expected = fmt::format("a number from {} to {}", number_text(min), number_text(max));
+    const std::string expected = "a number" + range_text(min, max);
     if (!whole && entry->value.kind != Node::Kind::number) {
         wrong_kind(*entry, expected);
     } else if (!(value >= min && value <= max)) {
@@ -197,8 +211,9 @@ void TomlTable::tables(const std::string& key, const std::function<void(TomlTabl
     }
 }
 
-void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read) {
-    std::string text = read_text_file(path, kMaxFileBytes);
+void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read,
+                    std::string_view kind) {
+    std::string text = read_text_file(path, kMaxFileBytes, kind);
     if (text.size() > kMaxFileBytes)
         throw Error(ErrorCode::usage,
                     fmt::format("{}: is larger than {} bytes", path.string(), kMaxFileBytes));

@@ -37,6 +37,8 @@ class TomlTable {
     void tables(const std::string& key, const std::function<void(TomlTable&)>& read);
     // Reports a problem with a key, or with the table where the key is missing.
     void report(const std::string& key, const std::string& message, const std::string& expected);
+    // Reports a problem that has a place of its own, as of another file.
+    void report(Problem problem);
 
   private:
     const Entry* find(std::string_view key);
@@ -49,7 +51,8 @@ class TomlTable {
     std::vector<std::string> asked_;
 };
 
-// Reads a file into a table. Throws SceneErrors with every problem, Error(io).
-void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read);
+// Reads a file into a table; messages call it by its `kind`. Throws SceneErrors with every problem, Error(io).
+void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read,
+                    std::string_view kind = "scene");
 
 }  // namespace nephos

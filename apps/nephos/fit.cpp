@@ -28,6 +28,8 @@ struct FitArguments {
 int fit(const FitArguments& a) {
     const ThreadLimit limit(1);  // workers are forked from one thread
     const FitOptions options = read_fit_file(a.file, a.runs);
+    if (!a.work.quiet)
+        for (const std::string& note : options.notes) print_note(note);
     SweepJob job;
     job.folder = a.out.empty() ? "out/fit-" + std::filesystem::path(a.file).stem().string() : a.out;
     job.workers = a.workers > 0 ? a.workers : int(std::max(1u, std::thread::hardware_concurrency()));

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -150,8 +151,19 @@ void add_density(py::module_& module) {
         });
 }
 
+// A whole number of Python, as int, NumPy's or any that has __index__; messages name the argument.
+std::uint64_t whole_number(const py::object& value, std::string_view name, std::string_view expected) {
+    const auto number = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
+    const unsigned long long taken = number ? PyLong_AsUnsignedLongLong(number.ptr()) : 0;
+    if (PyErr_Occurred() == nullptr) return taken;
+    PyErr_Clear();
+    throw Error(ErrorCode::usage,
+                fmt::format("{} is {}; expected {}", name, py::repr(value).cast<std::string>(), expected));
+}
+
 // Takes the steps with the interpreter lock released, and looks for signals in between.
-LiveSimulation& take_steps(LiveSimulation& simulation, std::uint64_t count) {
+LiveSimulation& take_steps(LiveSimulation& simulation, const py::object& n) {
+    std::uint64_t count = whole_number(n, "n", "a whole number of steps, 0 or more");
     while (count > 0) {
         {
             const py::gil_scoped_release released;
@@ -247,10 +259,11 @@ void add_simulation(py::module_& module) {
         "A scene that is stepped. Equal scenes and seeds give equal bits, whatever the number of threads. "
         "Long calls\n"
         "release the interpreter lock; calls of several threads on one simulation take turns.")
-        .def(py::init([](const SceneText& scene, std::optional<std::uint64_t> seed) {
-                 const py::gil_scoped_release released;
+        .def(py::init([](const SceneText& scene, const py::object& seed) {
                  Scene changed = scene.scene();
-                 if (seed) changed.automaton.seed = *seed;
+                 if (!seed.is_none())
+                     changed.automaton.seed = whole_number(seed, "seed", "a whole number from 0 to 2^64 - 1");
+                 const py::gil_scoped_release released;
                  return std::make_unique<LiveSimulation>(std::move(changed));
              }),
              "scene"_a, "seed"_a = py::none(),
@@ -258,7 +271,10 @@ void add_simulation(py::module_& module) {
              "fit into "
              "memory.")
         .def("step", &take_steps, "n"_a = 1, py::return_value_policy::reference_internal,
-             "Takes n steps, and returns the simulation. Ctrl-C ends it between two steps.")
+             "Takes n steps, and returns the simulation. Ctrl-C ends it between two steps. Raises Error "
+             "where n "
+             "is no\n"
+             "whole number of 0 or more.")
         .def_property_readonly("step_number", &LiveSimulation::step_number,
                                py::call_guard<py::gil_scoped_release>(), "Steps taken.")
         .def_property_readonly("time_s", &LiveSimulation::time_s, py::call_guard<py::gil_scoped_release>(),

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "core/error.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
 #include "scenes/format/writer.h"
@@ -11,7 +12,11 @@ namespace nephos {
 
 SceneText SceneText::from_file(const std::filesystem::path& path) {
     SceneText scene;
-    scene.text_ = read_text_file(path, kMaxSceneBytes);
+    try {
+        scene.text_ = read_text_file(path, kMaxSceneBytes);
+    } catch (const Error& error) {
+        throw Error(error.code(), error.what(), {path.string(), 0, 0});
+    }
     scene.label_ = path.string();
     scene.folder_ = path.parent_path();
     scene.read();

@@ -100,19 +100,21 @@ std::string joined(const std::vector<std::string>& items, std::string_view last_
     return out;
 }
 
-std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes) {
+std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes, std::string_view kind) {
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
-        throw Error(ErrorCode::io, path.string() + ": is a folder, expected a scene in TOML");
+        throw Error(ErrorCode::io,
+                    path.string() + ": is a folder, expected a " + std::string(kind) + " in TOML");
     }
     if (is_named_pipe(path)) {
-        throw Error(ErrorCode::io, path.string() + ": is a named pipe, expected a scene in TOML");
+        throw Error(ErrorCode::io,
+                    path.string() + ": is a named pipe, expected a " + std::string(kind) + " in TOML");
     }
     errno = 0;
     std::ifstream file(path, std::ios::binary);
     const auto failed = [&] {
         const std::string reason = errno != 0 ? std::strerror(errno) : "unknown error";
-        return Error(ErrorCode::io, path.string() + ": cannot read the scene: " + reason);
+        return Error(ErrorCode::io, path.string() + ": cannot read the " + std::string(kind) + ": " + reason);
     };
     if (!file) throw failed();
     // In parts: zeros for the largest scene took longer than all else of reading one, for each file of models.

@@ -42,7 +42,8 @@ std::string indexed(std::string_view path, std::size_t index);
 std::string joined(const std::vector<std::string>& items, std::string_view last_separator = " or ");
 
 // Returns at most the first `most_bytes` + 1 bytes of a file, so that the caller can detect a larger one.
-// Throws Error(io) naming the path when it is a folder or cannot be read.
-std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes);
+// Throws Error(io) naming the path, and the kind of file that it should be, when it is a folder or cannot be read.
+std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes,
+                           std::string_view kind = "scene");
 
 }  // namespace nephos

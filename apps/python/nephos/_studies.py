@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import tempfile
@@ -30,13 +31,14 @@ def _command():
     return found
 
 
-def _error(text, code):
+def _error(text, code, file=None, line=None, column=None):
     error = Error(text)
-    error.code, error.file, error.line, error.column = code, None, None, None
+    error.code, error.file, error.line, error.column = code, file, line, column
     return error
 
 
-def _call(arguments, allowed=(0,)):
+def _call(arguments, allowed=(0,), plan=None):
+    """Runs the command. `plan` is a file that its user did not write: messages call it the arguments."""
     process = subprocess.Popen([_command(), *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                text=True, errors="backslashreplace")
     try:
@@ -45,8 +47,14 @@ def _call(arguments, allowed=(0,)):
         process.wait()  # Ctrl-C reached it too; it keeps what is done
         raise
     if process.returncode not in allowed:
-        codes = {1: "check", 2: "usage", 3: "io", 4: "gpu"}
-        raise _error(message or f"nephos ended with status {process.returncode}", codes.get(process.returncode, "io"))
+        code = {1: "check", 2: "usage", 3: "io", 4: "gpu"}.get(process.returncode, "io")
+        if plan is not None:
+            message = message.replace(f"{plan}:", "arguments:")
+            message = re.sub(r"^--set (.*: error: )", r"axis \1", message, flags=re.MULTILINE)
+        place = re.match(r"(?:error: )?(?!arguments:)(.+?):(?:(\d+):(\d+):)? ", message)
+        found = place and (os.path.isabs(place[1]) or place[1] in map(str, arguments) or os.path.exists(place[1]))
+        where = (place[1], *(int(number) if number else None for number in place.groups()[1:])) if found else ()
+        raise _error(message or f"nephos ended with status {process.returncode}", code, *where)
 
 
 def _column(name, values):
@@ -119,12 +127,16 @@ def _plan(axes, options):
     lines = [f"{key} = {_toml_text(value)}" for key, value in options.items() if value is not None]
     for key, values in axes.items():
         keys = [key] if isinstance(key, str) else list(key)
+        if not isinstance(values, dict):
+            values = list(values)
+            if not values:
+                raise _error(f"axes[{key!r}] has no values; expected one or more, or {{'from': a, 'to': b, 'count': n}}", "usage")
         name = "range" if isinstance(values, dict) else "values"
         if isinstance(values, dict):
             entries = ", ".join(f"{entry} = {_toml_text(value)}" for entry, value in values.items())
             text = "{ " + entries + " }"
         else:
-            text = _toml_text(list(values))
+            text = _toml_text(values)
         lines += ["", "[[axis]]", f"keys = {_toml_text(keys)}", f"{name} = {text}"]
     return "\n".join(lines) + "\n"
 
@@ -164,7 +176,7 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
         plan.write_text(_plan(axes, options), encoding="utf-8")
         jobs = [] if workers is None else ["--workers", workers]
         part = [] if shard is None else ["--shard", f"{shard[0]}/{shard[1]}"]
-        _call(["sweep", plan, "--out", out, "--quiet", *jobs, *part, *_flags(retry_failed, overwrite)], allowed=(0, 1))
+        _call(["sweep", plan, "--out", out, "--quiet", *jobs, *part, *_flags(retry_failed, overwrite)], allowed=(0, 1), plan=plan)
     return Sweep(out) if shard is None else None
 
 

@@ -82,6 +82,46 @@ class Fit(Case):
         self.call("fit", file, "--out", "fit", "-j", "2", "--overwrite")
         self.assertEqual((self.folder / "fit/fit.json").read_bytes(), before)
 
+    def said_at(self, text, place, *says):
+        """A fit file that is refused at a place, by its own words."""
+        said = self.call("fit", self.write("bad.toml", text), "--out", "bad", status=2).stderr
+        line = next(n for n, row in enumerate(text.splitlines(), 1) if place in row)
+        self.assertRegex(said, rf"bad.toml:{line}:\d+: error: ")
+        self.assertIn(f"\n {line} | {place}", said)
+        for part in says:
+            self.assertIn(part, said)
+        self.assertNotIn("--set", said)
+        self.assertEqual(said.count(": error: "), 1, said)
+        self.assertFalse((self.folder / "bad").exists())
+
+    def test_what_is_wrong_is_said_where_it_stands(self):
+        self.write("null.toml", NULL)
+        second = "[[parameter]]\nkey = \"field.background.act\"\nprior = { from = 0.001, to = 0.002 }\n"
+        self.said_at(FIT.replace("value = 0.3", "value = 1.3"), "value = 1.3", "`cover` of 1.3", "above 0 and below 1")
+        self.said_at(FIT.replace("value = 0.3", "value = 0"), "value = 0", "above 0 and below 1")
+        self.said_at(FIT.replace('"cover"\nvalue = 0.3', '"base_mean_m"\nvalue = 0'), "value = 0", "`base_mean_m` of 0",
+                     "expected a number above 0\n")
+        self.said_at(FIT.replace("sd = 0.003", "sd = 0"), "sd = 0", "`target[0].sd` is 0", "expected a number above 0\n")
+        self.said_at(FIT.replace("[[target]]", second.replace(".act", ".ext") + "[[target]]").replace("key = \"", "keys = \"", 1),
+                     "key = \"", "`field.background.ext` is a parameter twice", "expected each key in one [[parameter]]")
+        self.said_at(FIT.replace("to = 0.3", "to = 1.4"), "prior =", "`field.background.ext` is 1.4, too large",
+                     "expected a number from 0 to 1, a probability per step")
+        self.said_at(FIT.replace("from = 0.02", "from = -0.1").replace(', scale = "log"', ""), "prior =", "is -0.1, too small")
+        self.said_at(FIT.replace("from = 0.02, ", ""), "prior =", "the prior has no `from`")
+        self.said_at(FIT.replace("ground.ext", "ground.exd"), "key = ", "did you mean `ext`")
+        self.said_at(FIT.replace("field.background.ext", "time.steps"), "key = ", "`time.steps` is no parameter of a fit")
+        self.said_at(FIT.replace("null.toml", "nothere.toml"), "scene = ", "nothere.toml: cannot read the scene: No such file",
+                     "relative to the folder of this file")
+        self.said_at('layer = "low"\n' + FIT, "layer = ", "has no layers")
+        self.said_at('set = "field.background.hum=2"\n' + FIT, "set = ", "`field.background.hum` is 2, too large")
+        self.said_at(FIT.replace('"cover"', '"clouds_per_km2"'), "statistic = ", "clouds_every = 0 takes none")
+        # Mistakes of the scene stand in the scene; several are told at once.
+        self.write("null.toml", NULL.replace("hum = 0.0", "hum = 7"))
+        said = self.call("fit", self.write("bad.toml", FIT.replace("sd = 0.003", "sd = 0")), status=2).stderr
+        self.assertRegex(said, r"null.toml:8:7: error: `field.background.hum` is 7(.|\n)*bad.toml:14:6: error: `target")
+        self.refused(3, "fit", "nothere.toml", says="nothere.toml: cannot read the fit file: No such file")
+        self.refused(3, "fit", str(self.folder), says="is a folder, expected a fit file in TOML")
+
     def test_bad_files(self):
         self.write("null.toml", NULL)
         for old, new, says in (("statistic = \"cover\"", "statistic = \"cower\"", "did you mean \"cover\"?"),

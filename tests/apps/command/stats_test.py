@@ -352,15 +352,61 @@ class Stats(Case):
         self.refused_fit(text + "missing = \"cloud\"", "clear")
         self.call("fit", self.with_target(text + "missing = \"clear\""), "--out", "clear", "-j", "2")
         target = json.loads((self.folder / "clear/fit.json").read_text())["targets"][0]
-        self.assertEqual((target["target"], target["missing"]), (0.25, 16))
+        self.assertEqual((target["target"], target["missing"], target["from"]), (0.25, 16, "swath.nc"))
+        notes = json.loads((self.folder / "clear/fit.json").read_text())["notes"]
+        self.assertIn("swath.nc has 8 x 4 cells of 50 m, null.toml has 128 x 64 x 20 cells of 50 m", notes[0])
+        self.assertIn("swath.nc: 16 of 32 values are missing, and count as clear", notes[1])
+
+    def test_what_a_view_from_above_lacks_is_no_target(self):
+        self.write("null.toml", NULL)
+        mask = random_mask(11, (64, 128), 0.25)
+        Image.fromarray((mask * 255).astype(numpy.uint8)).save(self.folder / "m.png")
+        for statistic in ("cloud_fraction", "base_mean_m", "top_mean_m", "overlap"):
+            said = self.refused_fit("from = \"m.png\"\ncell_size_m = 50\nsd = 0.05\n", f"view from above, and has no `{statistic}`",
+                                    statistic, clouds_every=10)
+            self.assertRegex(said, r"\| +\^\n")
+        Image.fromarray(numpy.zeros((64, 128), numpy.uint8)).save(self.folder / "clear.png")
+        self.refused_fit("from = \"clear.png\"\ncell_size_m = 50\nsd = 0.05\n", "the `cover` of 0 is no target (of clear.png)")
+
+    def test_sizes_of_mask_and_scene_are_compared(self):
+        """The scene has 128 x 64 x 20 cells of 50 m."""
+        self.write("null.toml", NULL)
+        files = {}
+        for name, shape in (("same", (64, 128)), ("large", (128, 256)), ("deep", (10, 64, 128))):
+            files[name] = self.netcdf(f"{name}.nc", random_mask(12, shape, 0.25) * 1.0, ("z", "y", "x")[-len(shape):])
+        def refused(file, cell, statistic, says, more=""):
+            self.refused_fit(f"from = \"{files[file]}\"\ncell_size_m = {cell}\nsd = 0.05\n{more}", says, statistic, clouds_every=10)
+        own = "null.toml has 128 x 64 x 20 cells of 50 m"
+        for statistic in ("edge_per_km", "clouds_per_km2", "cloud_area_m2", "size_exponent", "fractal_dimension"):
+            refused("same", 100, statistic, f"same.nc has 128 x 64 cells of 100 m, {own}: `{statistic}` depends on that")
+        refused("large", 50, "size_exponent_line", f"large.nc has 256 x 128 cells of 50 m, {own}: `size_exponent_line` depends")
+        refused("deep", 50, "overlap", f"deep.nc has 128 x 64 x 10 cells of 50 m and 40 m high, {own}: `overlap` depends",
+                "level_height_m = 40\n")
+        # What does not depend on them is compared, and a note says so; nothing is said of equal ones.
+        for file, cell, statistic, sizes in (("large", 50, "edge_per_km", "large.nc has 256 x 128 cells of 50 m"),
+                                             ("same", 100, "cover", "same.nc has 128 x 64 cells of 100 m"),
+                                             ("same", 50, "cover", None)):
+            text = FIT.replace("\"cover\"", f"\"{statistic}\"").replace("runs = 32", "runs = 10").replace("proof = 4", "proof = 0")
+            self.write("fit.toml", text.replace("value = 0.3\nsd = 0.003",
+                                                f"from = \"{files[file]}\"\ncell_size_m = {cell}\nsd = 0.05"))
+            result = self.call("fit", "fit.toml", "--out", "fit", "--overwrite", "-j", "2")
+            notes = json.loads((self.folder / "fit/fit.json").read_text())["notes"]
+            expected = [f"{sizes}, {own}: `{statistic}` is compared across that"] if sizes else []
+            self.assertEqual(notes, expected)
+            self.assertEqual([line for line in result.stderr.splitlines() if line.startswith("note: ")],
+                             [f"note: {note}" for note in expected])
 
     def with_target(self, text):
         return self.write("fit.toml", FIT.replace("value = 0.3\nsd = 0.003\n", text + "\n"))
 
-    def refused_fit(self, text, says):
-        result = self.call("fit", self.with_target(text), status=2)
+    def refused_fit(self, text, says, statistic="cover", clouds_every=0):
+        path = self.with_target(text)
+        fit = (self.folder / "fit.toml").read_text().replace("\"cover\"", f"\"{statistic}\"")
+        (self.folder / "fit.toml").write_text(fit.replace("clouds_every = 0", f"clouds_every = {clouds_every}"))
+        result = self.call("fit", path, status=2)
         self.assertIn(says, result.stderr)
         self.assertIn("fit.toml:", result.stderr)
+        return result.stderr
 
     def check_target(self, text):
         self.call("fit", self.with_target(text), "--out", "fit", "-j", "2")

@@ -58,7 +58,7 @@ class Scenes(Case):
         missing = str(self.folder / "none.toml")
         with self.assertRaises(nephos.Error) as caught:
             nephos.Scene(missing)
-        self.assertEqual((caught.exception.code, caught.exception.line), ("io", None))
+        self.assertEqual((caught.exception.code, caught.exception.file, caught.exception.line), ("io", missing, None))
         self.assertIn(str(caught.exception), self.call("hash", missing, status=3).stderr)
         scene = nephos.Scene(self.scene)
         with self.assertRaisesRegex(nephos.Error, "field.background.ext"):
@@ -84,8 +84,16 @@ class States(Case):
         self.assertEqual((self.simulation.step_number, self.simulation.time_s), (8, 80.0))
         other = nephos.Simulation(nephos.Scene(self.scene), seed=2**64 - 1).step(8)
         self.assertEqual(other.hash(), self.hashes(self.scene, "--steps", "8", "--seed", 2**64 - 1).split()[-1])
-        with self.assertRaises(TypeError):
-            self.simulation.step(-1)
+        for wrong in (-1, 1.5, "2", 2**64, None):
+            with self.assertRaises(nephos.Error) as caught:
+                self.simulation.step(wrong)
+            self.assertEqual(str(caught.exception), f"n is {wrong!r}; expected a whole number of steps, 0 or more")
+        for wrong in (-1, 0.5, 2**64):
+            with self.assertRaises(nephos.Error) as caught:
+                nephos.Simulation(nephos.Scene(self.scene), seed=wrong)
+            self.assertEqual(str(caught.exception), f"seed is {wrong!r}; expected a whole number from 0 to 2^64 - 1")
+        self.assertEqual(nephos.Simulation(nephos.Scene(self.scene), seed=numpy.int32(5)).step(numpy.uint8(8)).hash(),
+                         self.hashes(self.scene, "--steps", "8", "--seed", 5).split()[-1])
         with self.assertRaisesRegex(nephos.Error, "1000000000"):
             self.simulation.step(10**9)
         self.assertEqual(self.simulation.step(0).step_number, 8)
@@ -326,14 +334,27 @@ sd = 0.01
         with self.assertRaisesRegex(nephos.Error, "a probability per step") as caught:
             nephos.sweep(scene, {"field.background.ext": [0.1, 1.5]}, out=self.folder / "bad")
         self.assertEqual(caught.exception.code, "usage")
+        self.assertIn("axis field.background.ext=1.5: error: `field.background.ext` is 1.5", str(caught.exception))
         with self.assertRaisesRegex(nephos.Error, "did you mean"):
             nephos.sweep(scene, {"field.background.exd": [0.1]}, out=self.folder / "bad")
+        # No word of the plan, which the user never wrote.
+        for axes, options, says in (({"field.background.ext": []}, {}, r"axes\['field.background.ext'\] has no values"),
+                                    ({"field.background.ext": [0.1]}, {"replicates": 0}, "arguments:.*`replicates` is 0"),
+                                    ({"field.background.ext": {"from": 0.2, "to": 0.1}}, {}, "arguments:.*range of an axis is empty")):
+            with self.assertRaisesRegex(nephos.Error, says) as caught:
+                nephos.sweep(scene, axes, out=self.folder / "bad", **options)
+            self.assertNotIn(tempfile.gettempdir() + "/nephos-", str(caught.exception))
+            self.assertIsNone(caught.exception.file)
         self.assertFalse((self.folder / "bad").exists())
         with self.assertRaisesRegex(nephos.Error, "runs.csv"):
             nephos.Sweep(self.folder)
         with self.assertRaises(nephos.Error) as caught:
             nephos.fit(self.folder / "none.toml", self.folder / "fit")
-        self.assertEqual(caught.exception.code, "io")
+        self.assertEqual((caught.exception.code, caught.exception.file), ("io", str(self.folder / "none.toml")))
+        bad = self.write("bad.toml", "scene = 'nothere.toml'\n[[target]]\nstatistic = 'cover'\nvalue = 0.3\nsd = 0\n")
+        with self.assertRaises(nephos.Error) as caught:
+            nephos.fit(bad, self.folder / "fit")
+        self.assertEqual((caught.exception.file, caught.exception.line, caught.exception.column), (bad, 1, 9))
 
 
 class Threads(Case):
