@@ -18,6 +18,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstring>
 
 #include <hwy/highway.h>
 
@@ -146,7 +147,14 @@ HWY_INLINE void store_words(D d, const PhiloxState<D>& x, std::uint32_t* to) {
     const auto low = hn::Set(d, 0xFFFFFFFFu);
     const auto words01 = hn::Or(hn::And(x.w0, low), hn::ShiftLeft<32>(x.w1));
     const auto words23 = hn::Or(hn::And(x.w2, low), hn::ShiftLeft<32>(x.w3));
+#if HWY_TARGET == HWY_EMU128
+    // Stores lane by lane, which takes the alignment and the type of 64-bit words.
+    alignas(16) std::uint64_t pairs[2 * hn::MaxLanes(d)];
+    hn::StoreInterleaved2(words01, words23, d, pairs);
+    std::memcpy(to, pairs, sizeof pairs);
+#else
     hn::StoreInterleaved2(words01, words23, d, reinterpret_cast<std::uint64_t*>(to));
+#endif
 }
 #endif
 
