@@ -46,7 +46,7 @@ TEST(GoldenHashes, AreReachedWithAnyNumberOfThreads) {
     for (const auto& [name, hashes] : golden_hashes()) {
         const Scene scene = read_scene(kSource / "scenes" / name);
         for (std::size_t threads : {1, 2, 3, 8}) {
-            test::with_threads(threads, [&] {
+            test::with_threads(threads, [&, &name = name, &hashes = hashes] {
                 Automaton automaton(scene.automaton);
                 for (const auto& [step, hash] : hashes) {
                     while (automaton.steps() < step) automaton.step();
