@@ -114,8 +114,7 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     sample_nodes(cells, sums, before);
     mass_ *= 8;  // nodes for each cell
     set_erosion(setting, grid, base_m);
-    clearance_ = clearance_of_cells(nodes_, places_, table_, bricks_, erosion_.least_coverage,
-                                    repeats(setting) ? kMostInImages : 1);
+    cells_ = cells_of(nodes_, places_, table_, bricks_, erosion_.cloud_odds(), repeats(setting) ? kMostInImages : 1);
     set_distances(table_, bricks_);
 
     const Boundary boundaries[3] = {beyond.x, beyond.y, beyond.z};

@@ -32,6 +32,7 @@ HWY_INLINE Ints integer(std::int32_t value) { return hn::Set(IntLanes(), value);
 
 namespace text {
 using Real = Floats;
+using Truth = Mask;
 HWY_INLINE Floats operator*(float a, Floats b) { return hn::Mul(number(a), b); }
 HWY_INLINE Floats operator*(Floats a, float b) { return hn::Mul(a, number(b)); }
 HWY_INLINE Floats operator+(float a, Floats b) { return hn::Add(number(a), b); }
@@ -109,8 +110,10 @@ struct Node {
     Floats t, growth;
 };
 
-// t and growth at places in nodes, in bricks whose numbers are given; `local`: place in the brick, 0..8.
-HWY_INLINE Node node_at(const DetailKernel& field, Ints brick, Floats x, Floats y, Floats z) {
+// t and growth at places in nodes, in bricks whose numbers are given; x, y, z: place in the brick, 0..8. `most_t` becomes
+// the largest t of the eight nodes around, 0..255.
+HWY_INLINE Node node_at(const DetailKernel& field, Ints brick, Floats x, Floats y, Floats z,
+                        Floats* most_t = nullptr) {
     const Lanes d;
     const IntLanes di;
     constexpr int kEdge = CoverageField::kBrickNodes;
@@ -123,11 +126,16 @@ HWY_INLINE Node node_at(const DetailKernel& field, Ints brick, Floats x, Floats 
             hn::ConvertTo(di, x0))));
     const Floats fx = hn::Sub(x, x0), fy = hn::Sub(y, y0), fz = hn::Sub(z, z0);
     const auto* base = reinterpret_cast<const std::int32_t*>(field.nodes);
-    const auto row = [&](int offset) {
-        const Ints word = hn::GatherOffset(di, base, hn::Add(first, integer(offset)));
+    const auto word_of = [&](int offset) { return hn::GatherOffset(di, base, hn::Add(first, integer(offset))); };
+    const auto row = [&](Ints word) {
         return Node{mixed(byte_at(word, 0), byte_at(word, 16), fx), mixed(byte_at(word, 8), byte_at(word, 24), fx)};
     };
-    const Node a = row(0), b = row(2 * kEdge), c = row(2 * kEdge * kEdge), e = row(2 * kEdge * (kEdge + 1));
+    const Ints words[4] = {word_of(0), word_of(2 * kEdge), word_of(2 * kEdge * kEdge), word_of(2 * kEdge * (kEdge + 1))};
+    const Node a = row(words[0]), b = row(words[1]), c = row(words[2]), e = row(words[3]);
+    if (most_t != nullptr) {
+        const auto larger = [](Ints word) { return hn::Max(byte_at(word, 0), byte_at(word, 16)); };
+        *most_t = hn::Max(hn::Max(larger(words[0]), larger(words[1])), hn::Max(larger(words[2]), larger(words[3])));
+    }
     const Floats t = mixed(mixed(a.t, b.t, fy), mixed(c.t, e.t, fy), fz),
                  growth = mixed(mixed(a.growth, b.growth, fy), mixed(c.growth, e.growth, fy), fz);
     (void)d;

@@ -108,19 +108,22 @@ void sample_brick(const DetailKernel& field, std::int32_t brick, const float* co
     constexpr std::size_t kSide = CoverageField::kBrickNodes - 1, kCount = kSide * kSide * kSide,
                           kCells = CoverageField::kBrickCells;
     static_assert(kMaxLanes <= 2 * kSide, "all lanes lie in one row of cells");
-    const std::uint8_t* const clearance = field.clearance + std::size_t(brick) * kCells * kCells * kCells;
-    const std::size_t lanes = hn::Lanes(d);
-    if (std::find(clearance, clearance + kCells * kCells * kCells, 0) == clearance + kCells * kCells * kCells) {
+    const std::uint8_t* const cells = field.cells + std::size_t(brick) * CoverageField::kCellBytes;
+    const auto clear = [&](std::size_t cell) { return float(cells[cell]) * CoverageField::kFactorStep >= 1; };
+    std::size_t empty = 0;
+    while (empty < kCells * kCells * kCells && clear(empty)) ++empty;
+    if (empty == kCells * kCells * kCells) {
         std::fill_n(out, kCount, 0.0f);
         return;
     }
+    const std::size_t lanes = hn::Lanes(d);
     HWY_ALIGN float middle[3][kMaxLanes];
     Middles middles;
     if (samples == BrickSamples::middles) find_middles(field, brick, middles);
     for (std::size_t n = 0; n < kCount; n += lanes) {
         const std::size_t row = (n / kSide / kSide / 2 * kCells + n / kSide % kSide / 2) * kCells;
-        if (clearance[row] > 0 && clearance[row + 1] > 0 && clearance[row + 2] > 0 && clearance[row + 3] > 0) {
-            std::fill_n(out + n, lanes, 0.0f);  // no cloud near
+        if (clear(row) && clear(row + 1) && clear(row + 2) && clear(row + 3)) {
+            std::fill_n(out + n, lanes, 0.0f);
             continue;
         }
         for (std::size_t i = 0; i < lanes; ++i) {
@@ -176,7 +179,7 @@ float scalar_small_noise(float level, float x, float y, float z) {
 DetailKernel::DetailKernel(const CoverageField& field)
     : nodes(field.nodes().data()),
       table(field.table().data()),
-      clearance(field.clearance().data()),
+      cells(field.cells().data()),
       large_noise(detail_noise().large.data()),
       small_noise(detail_noise().small.data()),
       erosion(&field.erosion()),
@@ -189,7 +192,7 @@ DetailKernel::DetailKernel(const CoverageField& field)
 }
 
 std::size_t CoverageField::memory_bytes() const {
-    return nodes_.size() + clearance_.size() + 4 * cell_density_.size() + 4 * (table_.size() + places_.size());
+    return nodes_.size() + cells_.size() + 4 * cell_density_.size() + 4 * (table_.size() + places_.size());
 }
 
 std::vector<float> detailed_density(const CoverageField& field, const Vec3& corner_m,

@@ -92,6 +92,8 @@ struct ErosionConstants {
           fine_width = 0.03f;
     float wisps = 1;               // DetailOptions::wisps
     float least_coverage = 0.03f;  // where C is not larger there is no cloud, whatever the noise
+    // D / half there, or a little less: t / (1 - t).
+    float cloud_odds() const { return std::sqrt(least_coverage / (1 - least_coverage)) * 0.9999f; }
     float whole = 0;               // added to C in mask and G: 0, or kWhole to disable erosion
     float base_m = 0;              // height of the cloud's base above corner_m()
     std::array<float, 2> gain{};   // for scaled footprints up to 13 m, and from 25 m on; linear between
@@ -145,17 +147,22 @@ class CoverageField {
     }
     // Bricks on each axis.
     const std::array<int, 3>& bricks() const { return bricks_; }
-    // For each brick, x fastest: its number among those that hold cloud, from 0; or -n, n = 1..127 the Chebyshev
-    // distance in bricks to the nearest that does.
+    // For each brick, x fastest: its number among those that hold cloud, from 0; or, below 0, the empty cubes that begin
+    // there: for each octant n (1: towards rising x, 2: y, 4: z) the edge in bricks, 1..8, less by one, in three bits
+    // from bit 3 n on.
     const std::vector<std::int32_t>& table() const { return table_; }
     // For each brick that holds cloud, by its number: its index in table(), rising.
     const std::vector<std::int32_t>& places() const { return places_; }
     // kBrickBytes of each of these: t = D / (D + half) of each node, x fastest (0..255 for 0..1; detail_formulas.h
     // turns it into C and D), each followed by its growth (1..255 for -1..1).
     const std::vector<std::uint8_t>& nodes() const { return nodes_; }
-    // kBrickCells^3 bytes of each of these, x fastest: the Chebyshev distance in cells to the nearest cell that may
-    // hold cloud, 0..4. Three bytes of padding at the end, for reads of 4.
-    const std::vector<std::uint8_t>& clearance() const { return clearance_; }
+    // kBrickCells^3 bytes for each octant (as in table()) of each of these, x fastest, and three bytes more for reads of 4.
+    // Up to kOccupied: the cell may hold cloud where D is more than kFactorStep times this as large. Above: by how much, the
+    // edge in cells, 1..5, of the cube without cloud that begins there, whatever D is in images.
+    const std::vector<std::uint8_t>& cells() const { return cells_; }
+    static constexpr int kOccupied = 247;
+    static constexpr float kFactorStep = kMostInImages / (kOccupied + 1);
+    static constexpr std::size_t kCellBytes = 8 * kBrickCells * kBrickCells * kBrickCells;  // of a brick
 
     // kBrickCells^3 of each of these, x fastest: the mean detailed density of each cell, of eight samples whose
     // footprint is half a cell.
@@ -181,7 +188,7 @@ class CoverageField {
     Vec2 period_m_{0, 0};
     std::array<int, 3> bricks_{};
     std::vector<std::int32_t> table_, places_;
-    std::vector<std::uint8_t> nodes_, clearance_;
+    std::vector<std::uint8_t> nodes_, cells_;
     std::vector<float> cell_density_;
     std::array<double, 256> histogram_{};  // of t over the nodes
     double mass_ = 0;                      // 8 nodes a cell times the sum of the grid's values

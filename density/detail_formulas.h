@@ -14,6 +14,10 @@ NEPHOS_FUNCTION Real coverage_of(Real t) {
     return a / (a + b);
 }
 
+// Whether there may be cloud where nodes store at most 255 `t`, if D is `factor` times as large; `odds`: of the least
+// coverage (ErosionConstants::cloud_odds()).
+NEPHOS_FUNCTION Truth may_hold_cloud(Real t, Real factor, float odds) { return t * factor > odds * (255.0f - t); }
+
 NEPHOS_FUNCTION Real density_of(Real t, float half_density) {
     return half_density * t / max(1.0f - t, Real(1.0f / 512.0f));
 }

@@ -19,7 +19,7 @@ inline std::array<int, 3> brick_at(std::int32_t index, const std::array<int, 3>&
 struct DetailKernel {
     const std::uint8_t* nodes = nullptr;
     const std::int32_t* table = nullptr;
-    const std::uint8_t* clearance = nullptr;
+    const std::uint8_t* cells = nullptr;
     const std::uint32_t *large_noise = nullptr, *small_noise = nullptr;
     const ErosionConstants* erosion = nullptr;
     std::array<int, 3> bricks{};

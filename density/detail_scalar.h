@@ -12,6 +12,7 @@ namespace nephos {
 namespace detail_text {
 #define NEPHOS_FUNCTION inline
 using Real = float;
+using Truth = bool;
 inline float min(float a, float b) { return b < a ? b : a; }
 inline float max(float a, float b) { return a < b ? b : a; }
 inline float mul_add(float a, float b, float c) { return a * b + c; }

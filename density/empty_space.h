@@ -12,15 +12,13 @@
 
 namespace nephos {
 
-// Returns CoverageField::clearance() for its nodes(), places(), table() and bricks(), and three bytes more: kernels read
-// words. A cell may hold cloud when the coverage of one of its nodes is above `least_coverage` at `most` times
-// the density.
-std::vector<std::uint8_t> clearance_of_cells(std::span<const std::uint8_t> nodes, std::span<const std::int32_t> places,
-                                             std::span<const std::int32_t> table, const std::array<int, 3>& bricks,
-                                             float least_coverage, float most);
+// Returns CoverageField::cells() for its nodes(), places(), table() and bricks(). A cell may hold cloud when the largest
+// of its nodes may at `most` times the density; `cloud_odds`: ErosionConstants::cloud_odds().
+std::vector<std::uint8_t> cells_of(std::span<const std::uint8_t> nodes, std::span<const std::int32_t> places,
+                                   std::span<const std::int32_t> table, const std::array<int, 3>& bricks,
+                                   float cloud_odds, float most);
 
-// Replaces the negative numbers of CoverageField::table() by -n, n the distance in bricks to the next with cloud along
-// the axis on which it is largest, at most 127.
+// Replaces the negative numbers of CoverageField::table() by the empty cubes that begin there.
 void set_distances(std::span<std::int32_t> table, const std::array<int, 3>& bricks);
 
 }  // namespace nephos

@@ -90,6 +90,30 @@ HWY_INLINE BoxPart part_of(const MarchedScene& march, const MarchedVolume& volum
     return part;
 }
 
+// Numbers of the octants that directions lie in (CoverageField::table()), given one over them.
+HWY_INLINE Words octant_of(const Floats3& per_way) {
+    const hn::RebindToSigned<Lanes> di;
+    const auto bit_of = [&](Floats per, int bit) {
+        return hn::IfThenElseZero(hn::RebindMask(di, hn::Gt(per, hn::Zero(Lanes()))), hn::Set(di, bit));
+    };
+    return hn::Add(bit_of(per_way.x, 1), hn::Add(bit_of(per_way.y, 2), bit_of(per_way.z, 4)));
+}
+
+// The ways out of the half cells between eight nodes.
+HWY_INLINE Floats out_of_half(const MarchedVolume& volume, const BrickPlace& place, const Floats3& offset,
+                              const Floats3& per_way) {
+    const Floats zero = hn::Zero(Lanes());
+    const auto along = [&](Floats brick, Floats local, Floats offset_m, Floats per) {
+        const Floats low = hn::MulAdd(brick, set(8.0f), hn::Min(hn::Floor(local), set(7.0f)));
+        const Floats edge = hn::IfThenElse(hn::Gt(per, zero), hn::Add(low, set(1.0f)), low);
+        return hn::Mul(hn::MulSub(edge, set(volume.kernel.node_m), offset_m), per);
+    };
+    const Floats out = hn::Min(along(place.brick.x, place.local.x, offset.x, per_way.x),
+                               hn::Min(along(place.brick.y, place.local.y, offset.y, per_way.y),
+                                       along(place.brick.z, place.local.z, offset.z, per_way.z)));
+    return hn::Max(out, zero);
+}
+
 HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& ray, const Floats3& per_ray,
                                       const BoxPart* parts, Floats distance, Floats transmittance, Mask active) {
     const Lanes d;
@@ -126,21 +150,31 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
         Mask within = hn::And(place.within, active);
         if (!volume.repeats) within = hn::And(within, hn::Lt(distance, set(march.fade_ends)));
         const Mask holds = hn::And(within, hn::RebindMask(d, hn::Gt(place.number, hn::Set(di, -1))));
-        // Cells of the brick, and how far away the next with cloud is.
+        // The cell in the brick, and the cube without cloud that begins at that cell, or at a brick without cloud.
         const Floats half = set(0.5f), three = set(3.0f);
         const auto cell_of = [&](Floats local) { return hn::Min(hn::Floor(hn::Mul(local, half)), three); };
         const Floats3 cell{cell_of(place.local.x), cell_of(place.local.y), cell_of(place.local.z)};
         const Floats in_brick = hn::MulAdd(hn::MulAdd(cell.z, set(4.0f), cell.y), set(4.0f), cell.x);
-        const auto byte = hn::Add(hn::ShiftLeft<6>(hn::Max(place.number, hn::Zero(di))), hn::ConvertTo(di, in_brick));
-        const auto clear_word = hn::GatherOffset(
-            di, reinterpret_cast<const std::int32_t*>(volume.kernel.clearance), byte);
-        const Floats clear = hn::ConvertTo(d, hn::And(clear_word, hn::Set(di, 255)));
-        const Mask sampled = hn::And(holds, hn::Eq(clear, zero));
-        // Out of the cube of empty bricks or cells around the place.
-        const Floats count = hn::IfThenElse(holds, clear, hn::ConvertTo(d, hn::Neg(place.number)));
+        const Words octant = octant_of(per_way);
+        const auto of_octant = hn::Add(hn::ShiftLeft<3>(hn::Max(place.number, hn::Zero(di))), octant);
+        const auto word = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(volume.kernel.cells),
+                                           hn::Add(hn::ShiftLeft<6>(of_octant), hn::ConvertTo(di, in_brick)));
+        const auto byte = hn::And(word, hn::Set(di, 255));
+        const Floats least_patches = hn::Mul(hn::ConvertTo(d, byte), set(CoverageField::kFactorStep));
+        Mask sampled = hn::And(holds, hn::Lt(least_patches, set(volume.most_patches)));
+        Floats patches = one;
+        if (volume.repeats && !hn::AllFalse(d, sampled)) {
+            patches = patches_at(volume, in_volume);
+            sampled = hn::And(sampled, hn::Lt(least_patches, patches));
+        }
+        const auto bit = hn::Add(octant, hn::ShiftLeft<1>(octant));
+        const auto of_cells = hn::Sub(byte, hn::Set(di, CoverageField::kOccupied)),
+                   of_bricks = hn::Add(hn::And(hn::Shr(place.number, bit), hn::Set(di, 7)), hn::Set(di, 1));
+        const Floats count = hn::ConvertTo(
+            d, hn::IfThenElse(hn::RebindMask(di, holds), hn::Max(of_cells, hn::Set(di, 1)), of_bricks));
         const Floats size = hn::IfThenElse(holds, set(2 * volume.kernel.node_m), set(8 * volume.kernel.node_m));
-        const auto way_out = [&](Floats brick, Floats of_cell, Floats offset_m, Floats per) {
-            const Floats own = hn::IfThenElse(holds, hn::MulAdd(brick, set(4.0f), of_cell), brick);
+        const auto way_out = [&](Floats brick, Floats in_cell, Floats offset_m, Floats per) {
+            const Floats own = hn::IfThenElse(holds, hn::MulAdd(brick, set(4.0f), in_cell), brick);
             const Floats edge = hn::IfThenElse(hn::Gt(per, zero), hn::Add(own, count),
                                                hn::Sub(hn::Add(own, one), count));
             return hn::Mul(hn::MulSub(edge, size, offset_m), per);
@@ -162,9 +196,20 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
         if (!hn::AllFalse(d, sampled)) {
             // The other lanes read the first brick, which is in the cache.
             const auto number = hn::IfThenElseZero(hn::RebindMask(di, sampled), place.number);
+            Floats most_t = zero;
             erosion::Node node =
-                erosion::node_at(volume.kernel, number, place.local.x, place.local.y, place.local.z);
-            if (volume.repeats) node.t = scaled_share(node.t, patches_at(volume, in_volume));
+                erosion::node_at(volume.kernel, number, place.local.x, place.local.y, place.local.z, &most_t);
+            if (volume.repeats) node.t = scaled_share(node.t, patches);
+            const Mask clear =
+                hn::AndNot(erosion::text::may_hold_cloud(most_t, patches, volume.cloud_odds), sampled);
+            if (!hn::AllFalse(d, clear)) {
+                sampled = hn::AndNot(clear, sampled);
+                step = hn::IfThenElse(clear, hn::Add(out_of_half(volume, place, offset, per_way), beyond), step);
+            }
+            if (hn::AllFalse(d, sampled)) {
+                sample.step = hn::Min(sample.step, step);
+                continue;
+            }
             const erosion::Eroded found = erosion::eroded<true>(volume.kernel, node, offset.x, offset.y, offset.z,
                                                           hn::Max(footprint, set(shader::kLeastFootprint_m)), sampled);
             Floats extinction = hn::Mul(found.density, set(volume.kernel.extinction_per_m));
@@ -172,9 +217,9 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
             sample.extinction = hn::Add(sample.extinction, extinction);
             sample.which = hn::IfThenElse(hn::Gt(extinction, zero), set(float(v)), sample.which);
             sample.margin = hn::IfThenElse(sampled, hn::Min(sample.margin, found.margin), sample.margin);
-            const Floats towards = hn::Min(hn::Max(hn::Mul(found.margin, set(volume.reach)), least_step),
+            const Floats nearing = hn::Min(hn::Max(hn::Mul(found.margin, set(volume.reach)), least_step),
                                            hn::Max(set(shader::kLongestStep_m), least_step));
-            step = hn::IfThenElse(sampled, towards, step);
+            step = hn::IfThenElse(sampled, nearing, step);
             sample.near = hn::Or(sample.near, sampled);
         }
         sample.step = hn::Min(sample.step, step);

@@ -21,12 +21,14 @@ MarchedVolume::MarchedVolume(const CloudVolume& volume, const Vec3& eye_m, float
     for (int axis = 0; axis < 3; ++axis) corner[axis] = float(from[axis]);
     // The large noise changes by its whole width within half of a bump.
     const ErosionConstants& e = volume.field.erosion();
+    cloud_odds = e.cloud_odds();
     float per_m = 0;
     for (const auto& row : e.to_noise) per_m = std::max(per_m, std::hypot(row[0], row[1], row[2]));
     reach = 1 / (16 * per_m);
     repeats = volume.field.period_m().x > 0;
     if (!repeats) return;
     bend = bend_per_m;
+    most_patches = kMostInImages;
     set_repeats(volume, eye_m);
 }
 

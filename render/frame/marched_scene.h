@@ -21,6 +21,7 @@ struct MarchedVolume {
     DetailKernel kernel;
     float corner[3] = {};  // of its field, relative to the eye, metres
     float reach = 80;      // metres to cloud per missing coverage, at most
+    float cloud_odds = 0, most_patches = 1;  // ErosionConstants::cloud_odds(); patches_at() at most
     // As in shader::MarchVolume.
     float home = 0, period[2] = {}, per_period[2] = {}, bend = 0;
     bool repeats = false;

@@ -88,6 +88,7 @@ float fine_noise(uint v, float footprint, vec3 tiles) {
 
 struct Node {
     float t, growth;
+    float most_t;  // of the eight nodes around the place, 0..255
 };
 
 Node node_at(uint v, BrickPlace place) {
@@ -101,7 +102,8 @@ Node node_at(uint v, BrickPlace place) {
     vec2 ax = a.xy + share.x * (a.zw - a.xy), bx = b.xy + share.x * (b.zw - b.xy);
     vec2 cx = c.xy + share.x * (c.zw - c.xy), ex = e.xy + share.x * (e.zw - e.xy);
     vec2 low = ax + share.y * (bx - ax), high = cx + share.y * (ex - cx), both = low + share.z * (high - low);
-    return Node(both.x * (1.0 / 255.0), both.y * (1.0 / 127.0) - 128.0 / 127.0);
+    vec2 most = max(max(a.xz, b.xz), max(c.xz, e.xz));
+    return Node(both.x * (1.0 / 255.0), both.y * (1.0 / 127.0) - 128.0 / 127.0, max(most.x, most.y));
 }
 
 // Rounded as the processor does it: of the fine noise there are thousands of voxels in a tile.

@@ -64,18 +64,18 @@ HWY_INLINE PlaceIn endless_place(const MarchedVolume& volume, Floats x, Floats y
         return hn::Sub(hn::Max(hn::Sub(at, set(volume.home + volume.period[axis])), zero),
                        hn::Max(hn::Sub(set(volume.home), at), zero));
     };
-    PlaceIn place{{}, x, y, beyond(x, 0), beyond(y, 1), {zero, zero}, {zero, zero}};
-    if (!hn::AllTrue(d, hn::Eq(hn::Or(place.beyond_x, place.beyond_y), zero))) {
-        place.across = wave_at(volume, place.beyond_y, shader::kWaveAcross);
-        place.along = wave_at(volume, place.beyond_x, shader::kWaveAlong);
+    const Floats beyond_x = beyond(x, 0), beyond_y = beyond(y, 1);
+    Wave across{zero, zero}, along{zero, zero};
+    if (!hn::AllTrue(d, hn::Eq(hn::Or(beyond_x, beyond_y), zero))) {
+        across = wave_at(volume, beyond_y, shader::kWaveAcross);
+        along = wave_at(volume, beyond_x, shader::kWaveAlong);
     }
     const auto at_home = [&](Floats at, std::size_t axis) {
         const Floats periods = hn::Floor(hn::Mul(hn::Sub(at, set(volume.home)), set(volume.per_period[axis])));
         return hn::NegMulAdd(periods, set(volume.period[axis]), at);
     };
-    place.offset.x = at_home(hn::Add(x, place.across.height), 0);
-    place.offset.y = at_home(hn::Add(y, place.along.height), 1);
-    return place;
+    return {{at_home(hn::Add(x, across.height), 0), at_home(hn::Add(y, along.height), 1), zero},
+            x, y, beyond_x, beyond_y, across, along};
 }
 
 // Of points relative to the eye.

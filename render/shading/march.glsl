@@ -152,8 +152,17 @@ struct MarchSample {
 struct MarchPlace {
     bool within;  // the bricks' box
     float out_m, on_m;  // the latter from beside the box, below a cloud that repeats to its base
-    bool near;
+    bool near;          // cloud, as the cell may hold some
 };
+
+float least_of(vec3 numbers) { return min(numbers.x, min(numbers.y, numbers.z)); }
+
+// Returns whether a cell may hold cloud, given its byte of CoverageField::cells().
+bool occupied_at(uint v, int cell, vec3 point) {
+    float least_patches = float(cell) * ((1.0 + kPatchSpread) / float(kOccupied + 1));
+    if (march.volumes[v].repeats == 0.0) return least_patches < 1.0;
+    return cell <= kOccupied && least_patches < patches_of(v, point);
+}
 
 MarchPlace march_place(uint v, vec3 ray, vec3 per_ray, float distance) {
     vec4 corner = march.volumes[v].corner;
@@ -164,21 +173,34 @@ MarchPlace march_place(uint v, vec3 ray, vec3 per_ray, float distance) {
     per_ray = inverse_of(way_in(v, ray, distance));
     bool holds = holds_cloud(place);
     vec3 cell = min(floor(0.5 * place.local), vec3(3.0));
-    uint byte = 64u * uint(max(place.number, 0)) + uint((cell.z * 4.0 + cell.y) * 4.0 + cell.x);
-    uint clear = (march_cells[march.volumes[v].first_clearance + byte / 4u] >> (8u * (byte & 3u))) & 255u;
-    float count = holds ? float(clear) : float(-place.number), size = (holds ? 2.0 : 8.0) * corner.w;
+    bvec3 up = greaterThan(per_ray, vec3(0.0));
+    uint octant = (up.x ? 1u : 0u) + (up.y ? 2u : 0u) + (up.z ? 4u : 0u);
+    uint byte = 64u * octant + uint((cell.z * 4.0 + cell.y) * 4.0 + cell.x);
+    uint word = march_cells[march.volumes[v].first_cells + kCellWords * uint(max(place.number, 0)) + byte / 4u];
+    int of_cell = int((word >> (8u * (byte & 3u))) & 255u);
+    int of_brick = (place.number >> (3u * octant)) & 7;
+    float count = float(holds ? max(of_cell - kOccupied, 1) : of_brick + 1), size = (holds ? 2.0 : 8.0) * corner.w;
     vec3 own = holds ? place.brick * 4.0 + cell : place.brick;
-    vec3 edge = mix(own + 1.0 - count, own + count, greaterThan(per_ray, vec3(0.0)));
+    vec3 edge = mix(own + 1.0 - count, own + count, up);
     vec3 out_m = (edge * size - offset) * per_ray;
     // The next period is another place in the bricks.
     vec2 period = vec2(march.volumes[v].period_x, march.volumes[v].period_y);
-    vec2 face = march.volumes[v].home + mix(vec2(0.0), period, greaterThan(per_ray.xy, vec2(0.0)));
+    vec2 face = march.volumes[v].home + mix(vec2(0.0), period, up.xy);
     vec2 to_face = (face - offset.xy) * per_ray.xy;
     if (endless) out_m = min(out_m, vec3(to_face, kStraightWay_m));
     float on_m = max(1.0, min(-offset.z * (per_ray.z > 0.0 ? per_ray.z : kLongestLeap_m), kLongestLeap_m));
-    return MarchPlace(place.within, min(out_m.x, min(out_m.y, out_m.z)), endless ? on_m : 1.0,
-                      holds && place.within && clear == 0u);
+    return MarchPlace(place.within, least_of(out_m), endless ? on_m : 1.0,
+                      holds && place.within && occupied_at(v, of_cell, distance * ray));
 }
+
+// Returns the way out of the half of a cell that lies between eight nodes.
+float out_of_half(uint v, BrickPlace place, vec3 offset, vec3 way) {
+    vec3 per_way = inverse_of(way), own = place.brick * 8.0 + min(floor(place.local), vec3(7.0));
+    vec3 edge = mix(own, own + 1.0, greaterThan(per_way, vec3(0.0)));
+    return max(least_of((edge * march.volumes[v].corner.w - offset) * per_way), 0.0);
+}
+
+float beyond_face(uint v) { return march.volumes[v].repeats > 0.0 ? kBeyondBentFace_m : kBeyondFace_m; }
 
 // Sets the step to where cloud may be, as far as nothing is to be sampled.
 MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
@@ -190,8 +212,7 @@ MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
         // repeats they go on to its base.
         float step = distance < part.y ? at.on_m : kFarAway_m;
         if (distance < part.x) step = part.x - distance + kBeyondFace_m;
-        float beyond = march.volumes[v].repeats > 0.0 ? kBeyondBentFace_m : kBeyondFace_m;
-        if (at.within) step = max(at.out_m, 0.0) + beyond;
+        if (at.within) step = max(at.out_m, 0.0) + beyond_face(v);
         if (at.near)
             result.near |= 1u << v;
         else
@@ -208,8 +229,15 @@ void sample_near(inout MarchSample result, vec3 ray, float distance, float trans
     for (uint v = 0u; v < march.count; ++v) {
         if ((result.near >> v & 1u) != 0u) {
             vec3 offset = offset_in(v, distance * ray);
-            Node node = node_at(v, brick_place(v, offset));
-            node.t = scaled_share(node.t, patches_of(v, distance * ray));
+            BrickPlace place = brick_place(v, offset);
+            Node node = node_at(v, place);
+            float patches = patches_of(v, distance * ray);
+            if (!may_hold_cloud(node.most_t, patches, march.volumes[v].cloud_odds)) {  // no cloud within half of the cell
+                result.near &= ~(1u << v);
+                result.step = min(result.step, out_of_half(v, place, offset, way_in(v, ray, distance)) + beyond_face(v));
+                continue;
+            }
+            node.t = scaled_share(node.t, patches);
             Eroded found = eroded(v, node, offset, max(footprint, kLeastFootprint_m), true);
             float extinction = found.density * march.volumes[v].extinction_per_m;
             if (march.volumes[v].repeats == 0.0) extinction *= kept;

@@ -54,10 +54,11 @@ NEPHOS_CONST float kDiffuseDecay = 1.5f, kMostRelief = 2.0f;
 NEPHOS_CONST float kMostFluence = 6.0f;               // that a node can store
 NEPHOS_CONST float kMostMarchedDepth = 64.0f;         // towards the sun: of more nothing arrives
 NEPHOS_CONST uint kGroundTexels = 96u;                // on an edge of the map of light on the ground (ground_light.h)
-// Words of a brick: of its nodes, of the corners of its cells, and of its cells' clearance.
+// Words of a brick: of its nodes, of the corners of its cells, and of its cells.
 NEPHOS_CONST uint kNodeEdge = 9u, kNodeWords = 729u;
 NEPHOS_CONST uint kMarchLightNodes = 5u, kMarchLightWords = 125u;
-NEPHOS_CONST uint kClearanceWords = 16u;
+NEPHOS_CONST uint kCellWords = 128u;
+NEPHOS_CONST int kOccupied = 247;                     // CoverageField::cells()
 NEPHOS_CONST uint kLargeNoiseWords = 2097152u;        // those of the small noise follow
 // Metaballs take over from rays between these footprints of a pixel, in cells of 40 m: where they are smaller than a
 // pixel. Larger cells have larger bumps, and their metaballs take over at footprints that are larger in proportion.
@@ -77,7 +78,7 @@ struct MarchVolume {
     vec4 to_noise[3];    // rows, as in ErosionConstants
     uint bricks_x, bricks_y, bricks_z;
     float per_node;      // 1 / metres between two nodes
-    uint first_table, first_clearance, first_nodes;  // of its words
+    uint first_table, first_cells, first_nodes;  // of its words
     uint first_light;
     uint light_words;    // of its sun depths; those of the surroundings follow, and two of the diffuse light
     float reach;         // metres to cloud per missing coverage, at most
@@ -109,7 +110,8 @@ struct MarchVolume {
     uint bands, first_bands;      // of heights that drift apart: how many, and their first word (ErosionConstants::bands)
     float bands_begin;
     float bands_per_m;
-    uint unused0, unused1, unused2;
+    float cloud_odds;             // ErosionConstants::cloud_odds()
+    uint unused0, unused1;
 };
 
 struct March {

@@ -229,6 +229,7 @@ inline float max(float a, float b) { return a < b ? b : a; }
 inline float fast_exp(float x) { return exp(x); }
 #else
 #define Real float
+#define Truth bool
 #define mul_add(a, b, c) ((a) * (b) + (c))
 #define select(condition, a, b) ((condition) ? (a) : (b))
 #define fast_exp(x) exp(x)

@@ -2,6 +2,7 @@
 #include "render/vulkan/march_volumes.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <string>
 
@@ -18,14 +19,15 @@ namespace {
 constexpr std::size_t kEdge = CoverageField::kBrickNodes, kNodes = kEdge * kEdge * kEdge;
 static_assert(shader::kNodeEdge == kEdge && shader::kNodeWords == kNodes);
 static_assert(shader::kMarchLightNodes == kLightNodes && shader::kMarchLightWords == kLightNodesOfBrick);
-static_assert(4 * shader::kClearanceWords ==
-              CoverageField::kBrickCells * CoverageField::kBrickCells * CoverageField::kBrickCells);
+static_assert(4 * shader::kCellWords == CoverageField::kCellBytes && shader::kOccupied == CoverageField::kOccupied);
+static_assert((1 + shader::kPatchSpread) / (1 + shader::kOccupied) == CoverageField::kFactorStep);
+static_assert(std::endian::native == std::endian::little);
 static_assert(shader::kGroundTexels == GroundLight::kTexels);
 static_assert(shader::kLargeNoiseWords == kLargeNoiseVoxels * kLargeNoiseVoxels * kLargeNoiseVoxels);
 
 // Where the words of a volume begin.
 struct Places {
-    std::size_t table = 0, clearance = 0, nodes = 0, bands = 0, light = 0, shade = 0;
+    std::size_t table = 0, cells = 0, nodes = 0, bands = 0, light = 0, shade = 0;
     std::size_t cells_end = 0, light_end = 0;
 };
 
@@ -33,8 +35,8 @@ Places places_after(const Places& before, const CloudVolume& volume) {
     const std::size_t bricks = volume.field.places().size();
     Places at;
     at.table = before.cells_end;
-    at.clearance = at.table + volume.field.table().size();
-    at.nodes = at.clearance + bricks * shader::kClearanceWords;
+    at.cells = at.table + volume.field.table().size();
+    at.nodes = at.cells + bricks * shader::kCellWords;
     at.bands = at.nodes + bricks * kNodes;
     at.cells_end = at.bands + 4 * volume.field.erosion().bands.size();
     at.light = before.light_end;
@@ -76,8 +78,7 @@ std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes) {
         std::memcpy(&words[at.table], field.table().data(), 4 * field.table().size());
         const auto& bands = field.erosion().bands;
         if (!bands.empty()) std::memcpy(&words[at.bands], bands.data(), sizeof bands[0] * bands.size());
-        for (std::size_t i = 0; i < field.clearance().size(); ++i)
-            words[at.clearance + i / 4] |= std::uint32_t(field.clearance()[i]) << (i % 4 * 8);
+        std::memcpy(&words[at.cells], field.cells().data(), 4 * shader::kCellWords * field.places().size());
         tbb::parallel_for(std::size_t{0}, field.places().size(), [&](std::size_t brick) {
             const std::uint8_t* const from = &field.nodes()[brick * CoverageField::kBrickBytes];
             std::uint32_t* const to = &words[at.nodes + brick * kNodes];
@@ -128,7 +129,7 @@ shader::March march_constants(const LitCloud& cloud, const CameraFrame& camera, 
         to.bricks_z = shader::uint(from.kernel.bricks[2]);
         to.per_node = 1.0f / from.kernel.node_m;
         to.first_table = shader::uint(at.table);
-        to.first_clearance = shader::uint(at.clearance);
+        to.first_cells = shader::uint(at.cells);
         to.first_nodes = shader::uint(at.nodes);
         to.first_light = shader::uint(at.light);
         to.light_words = shader::uint((at.shade - at.light) / 4);
@@ -151,6 +152,7 @@ shader::March march_constants(const LitCloud& cloud, const CameraFrame& camera, 
         to.fine_per_m = e.fine_per_m;
         to.footprint_scale = e.footprint_scale;
         to.least_coverage = e.least_coverage;
+        to.cloud_odds = from.cloud_odds;
         to.whole = e.whole;
         to.home = from.home;
         to.period_x = from.period[0];

@@ -15,7 +15,7 @@
 
 namespace nephos {
 
-// Words of all volumes that hold cloud, one volume after the other: table, clearance and nodes of their fields. A node's
+// Words of all volumes that hold cloud, one volume after the other: table, cells and nodes of their fields. A node's
 // word has its t and growth, and those of the next along x: what a look-up interpolates.
 std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes);
 // Words of the corners of cells, with what the next along x has: sun depths, then surroundings, of each volume; then those

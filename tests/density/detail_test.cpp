@@ -248,32 +248,6 @@ TEST(Detail, FieldIsThatOfTheMetaballs) {
     EXPECT_GT(compared, 200u);
 }
 
-// No cell that clearance calls empty has cloud, and neither has any brick without a number.
-TEST(Detail, EmptySpaceIsEmpty) {
-    const DensityGrid grid = domes({48, 40, 20}, 11);
-    const CoverageField field(grid, cumulus_setting());
-    const auto& bricks = field.bricks();
-    std::size_t empty = 0;
-    for (int n = 0; n < 60000; ++n) {
-        const double edge = field.node_m() * 8;
-        const Vec3 share(std::fmod(n * 0.754877666, 1), std::fmod(n * 0.569840291, 1), std::fmod(n * 0.362718, 1));
-        const Vec3 from = share * edge * Vec3(bricks[0], bricks[1], bricks[2]);
-        const int b[3] = {int(from.x / edge), int(from.y / edge), int(from.z / edge)};
-        const std::int32_t number =
-            field.table()[std::size_t((b[2] * bricks[1] + b[1]) * bricks[0] + b[0])];
-        bool clear = number < 0;
-        if (number >= 0) {
-            const Vec3 in = (from - edge * Vec3(b[0], b[1], b[2])) / (2 * field.node_m());
-            clear = field.clearance()[std::size_t(number) * 64 +
-                                      std::size_t((int(in.z) * 4 + int(in.y)) * 4 + int(in.x))] > 0;
-        }
-        if (!clear) continue;
-        ++empty;
-        EXPECT_EQ(detailed_density_at(field, field.corner_m() + from, 2), 0.0f);
-    }
-    EXPECT_GT(empty, 10000u);
-}
-
 TEST(Detail, DissolvingCloudIsTornAndGrowingIsNot) {
     const DensityGrid grid = domes({64, 64, 20}, 13);
     std::vector<float> moist(grid.extent().cells());
