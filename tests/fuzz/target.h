@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <string_view>
 
@@ -78,7 +79,11 @@ class Names {
         require(mkdtemp(name.data()) != nullptr, "mkdtemp");
         folder_ = name;
     }
+    // With a file beside them, which they may name.
+    Names(const char* name, std::string_view text) : Names() { std::ofstream(folder_ / name) << text; }
     ~Names() { std::filesystem::remove_all(folder_); }
+    Names(const Names&) = delete;
+    Names& operator=(const Names&) = delete;
     std::filesystem::path of(const InputFile& file, const char* ending) const {
         const std::filesystem::path link = folder_ / (std::string("input") + ending);
         std::filesystem::remove(link);

@@ -34,7 +34,8 @@ Scene coarse_storm() {
                                              "fog.height_m=300",
                                              "frames.exr=true",
                                              // `blended` has none; ShippedScenes and MarchBackends compare it.
-                                             "detail.enabled=false", "layer[2].detail.enabled=false"};
+                                             "detail.enabled=false", "layer[0].detail.enabled=false",
+                                             "layer[2].detail.enabled=false"};
     return read_scene(std::filesystem::path(NEPHOS_SOURCE_DIR) / "scenes/storm.toml", overrides);
 }
 
