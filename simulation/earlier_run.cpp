@@ -99,9 +99,14 @@ std::string range_text(const EarlierRun& run) {
 // Names the keys in which two scenes differ, at most three of them.
 std::string changed_keys(const EarlierRun& earlier, const RunSettings& settings) {
     std::vector<std::string> keys;
-    const auto value_in = [](const Parameters& parameters, const std::string& key) -> std::string {
-        const auto found = std::ranges::find(parameters, key, &Parameters::value_type::first);
-        return found == parameters.end() ? "its default" : found->second;
+    // Manifests of earlier versions have only the keys that were not at their defaults.
+    const Parameters defaults = parameters(Scene{});
+    const auto value_in = [&](const Parameters& parameters, const std::string& key) -> std::string {
+        for (const Parameters* list : {&parameters, &defaults}) {
+            const auto found = std::ranges::find(*list, key, &Parameters::value_type::first);
+            if (found != list->end()) return found->second;
+        }
+        return "not there";
     };
     const Parameters now = parameters(settings.scene);
     for (const Parameters* list : {&earlier.parameters, &now}) {

@@ -328,7 +328,8 @@ RunReport report_of_complete(const RunSettings& settings, const RunFolder& folde
     report.steps_reported = settings.range.last_step + 1;
     read_statistics(
         folder.statistics(), report.steps_reported,
-        [&](std::uint64_t, std::string_view, const StateHash& hash) { report.state_hash = hash.hex(); });
+        [&](std::uint64_t, std::string_view, const StateHash& hash) { report.state_hash = hash.hex(); },
+        kStatisticsHeader, kStartAnew);
     report.files = {statistics_files(settings, folder), {"manifest", {folder.manifest()}}};
     return report;
 }

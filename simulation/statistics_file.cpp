@@ -70,7 +70,8 @@ std::string statistics_row(const StepResult& result, const LayerStep& layer) {
 }
 
 std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
-                              const StatisticsVisitor& visit, std::string_view header) {
+                              const StatisticsVisitor& visit, std::string_view header,
+                              std::string_view cure) {
     require_regular_file(path);
     std::ifstream stream(path, std::ios::binary);
     std::string line;
@@ -88,8 +89,8 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
     if (!good) {
         check_reading(stream, path);
         throw Error(ErrorCode::io,
-                    fmt::format("{}: does not hold the steps 0 to {} that the checkpoint goes on from",
-                                path.string(), steps == 0 ? 0 : steps - 1));
+                    fmt::format("{}: does not hold the steps 0 to {} that the checkpoint goes on from{}",
+                                path.string(), steps == 0 ? 0 : steps - 1, cure));
     }
     return bytes;
 }
@@ -115,7 +116,7 @@ StatisticsFile StatisticsFile::create(const std::filesystem::path& path, std::st
 
 StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::uint64_t steps,
                                       const StatisticsVisitor& visit, std::string_view header) {
-    const std::uint64_t size = read_statistics(path, steps, visit, header);
+    const std::uint64_t size = read_statistics(path, steps, visit, header, kStartAnew);
     Descriptor file = open_regular_file(path, O_WRONLY | O_APPEND);
     if (::ftruncate(file.get(), off_t(size)) != 0) fail(path, errno);
     return StatisticsFile(path, std::move(file), size);

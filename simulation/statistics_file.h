@@ -35,9 +35,13 @@ using StatisticsVisitor =
 
 // Calls `visit`, which may be empty, for the rows of the first `steps` steps of a file in their order, and
 // gives back where the next row begins, in bytes. Throws Error(io) when the file does not begin with exactly
-// these rows.
+// these rows; the message ends with `cure`.
 std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
-                              const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
+                              const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader,
+                              std::string_view cure = {});
+
+// The cure where the run itself is called again.
+inline constexpr std::string_view kStartAnew = "; --overwrite instead of --resume starts the run anew";
 
 // Returns true when a file begins with the header; false also when it cannot be opened. Throws ReadFailure.
 bool is_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);

@@ -18,6 +18,7 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/random.h"
+#include "core/text.h"
 #include "simulation/layer_simulation.h"
 
 namespace nephos {
@@ -58,6 +59,24 @@ Json head(const PlannedRun& run, std::string_view status) {
             {"replicate", run.replicate},
             {"seed", std::to_string(run.seed)},
             {"values", run.values}};
+}
+
+// Throws Error(usage) on a record of another version, with a cure that the command which reads it has.
+void require_this_version(const Json& json, const std::filesystem::path& shard, RecordsFor use) {
+    const Json &statistics = json.at("statistics_version"), &stream = json.at("random_stream_version");
+    if (statistics == NEPHOS_STATISTICS_VERSION && stream == kRandomStreamVersion) return;
+    const auto found = [](const Json& version) { return escaped(version.dump()); };
+    const std::string folder = shard.parent_path().parent_path().string();
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: has records of version {} of the statistics and {} of the random stream, and this "
+                            "nephos makes versions {} and {}: {}",
+                            shard.string(), found(statistics), found(stream), NEPHOS_STATISTICS_VERSION,
+                            kRandomStreamVersion,
+                            use == RecordsFor::running
+                                ? "choose another --out, or give --overwrite"
+                                : fmt::format("leave {0} out, or compute its runs again with `nephos sweep "
+                                              "{0}/sweep.toml --out {0} --overwrite`",
+                                              folder)));
 }
 
 Regime regime_of(const std::string& name) {
@@ -187,14 +206,16 @@ std::string failure_line(const PlannedRun& run, std::string_view message) {
     return sealed(json);
 }
 
-std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesystem::path& path) {
+std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesystem::path& path,
+                                                            RecordsFor use) {
     require_regular_file(path);
     std::ifstream stream(path, std::ios::binary);
     const auto shard = std::uint32_t(files_.size());
-    files_.push_back(std::filesystem::path(path).replace_extension(".series"));
+    files_.push_back({std::filesystem::path(path).replace_extension(".series"), folders_ - 1});
     // Series are written before the records that name them: fewer are damage, and not to be filled with zeros.
+    const std::filesystem::path& series_path = files_.back().path;
     std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(files_.back(), error);
+    const std::uintmax_t size = std::filesystem::file_size(series_path, error);
     const std::uint64_t stored = error ? 0 : size;
     std::uint64_t at = 0, bytes = 0, series = 0;
     std::string problem;
@@ -210,12 +231,7 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
         bytes = at + line.size() + 1;
         try {
             const Json json = Json::parse(line);
-            if (json.at("statistics_version") != NEPHOS_STATISTICS_VERSION ||
-                json.at("random_stream_version") != kRandomStreamVersion)
-                throw Error(ErrorCode::usage,
-                            path.string() +
-                                ": has records of another version of the statistics or of the random stream: "
-                                "choose another --out, or give --overwrite");
+            require_this_version(json, path, use);
             RunRecord record = record_of(json);
             record.shard = shard;
             const std::uint64_t values = kSeries.size() * (std::min(record.result.steps, kMaxSteps) + 1);
@@ -229,7 +245,7 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
                 const std::uint64_t end = record.series_offset + record.series_bytes;
                 if (end > stored) {
                     note(at, fmt::format("names {} bytes of {}, which has fewer: {}", end,
-                                         files_.back().filename().string(), stored));
+                                         series_path.filename().string(), stored));
                     continue;
                 }
                 series = std::max(series, end);
@@ -249,9 +265,10 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
     return {bytes, series};
 }
 
-Records Records::read(const std::vector<std::filesystem::path>& folders) {
+Records Records::read(const std::vector<std::filesystem::path>& folders, RecordsFor use) {
     Records records;
     for (const std::filesystem::path& folder : folders) {
+        ++records.folders_;
         std::vector<std::filesystem::path> files;
         try {
             files = files_of_shards(folder);
@@ -260,7 +277,7 @@ Records Records::read(const std::vector<std::filesystem::path>& folders) {
         }
         for (const std::filesystem::path& file : files) {
             try {
-                records.read_shard(file);
+                records.read_shard(file, use);
             } catch (const Error& problem) {
                 if (problem.code() != ErrorCode::io) throw;
                 records.problems_.emplace_back(problem.what());
@@ -270,13 +287,19 @@ Records Records::read(const std::vector<std::filesystem::path>& folders) {
     return records;
 }
 
+std::vector<std::uint64_t> Records::sizes_of_folders() const {
+    std::vector<std::uint64_t> sizes(folders_, 0);
+    for (const auto& [id, record] : runs_) ++sizes[folder_of(record)];
+    return sizes;
+}
+
 const RunRecord* Records::find(const std::string& id) const {
     const auto found = runs_.find(id);
     return found == runs_.end() ? nullptr : &found->second;
 }
 
 std::vector<float> Records::series(const RunRecord& record) const {
-    const std::filesystem::path& path = files_[record.shard];
+    const std::filesystem::path& path = files_[record.shard].path;
     const Descriptor file = open_regular_file(path, O_RDONLY);
     std::string packed(record.series_bytes, '\0');
     for (std::size_t had = 0; had < packed.size();) {
@@ -357,7 +380,8 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
     files_->series = open_regular_file(series_path_, O_WRONLY | O_APPEND | O_CREAT);
     lock(path_, files_->records);
     Records records;
-    const auto [bytes, series] = records.read_shard(path_);
+    records.folders_ = 1;
+    const auto [bytes, series] = records.read_shard(path_, RecordsFor::running);
     if (!records.problems().empty())
         throw Error(ErrorCode::io,
                     records.problems().front() + "; --overwrite computes the runs of this shard again");

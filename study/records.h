@@ -38,30 +38,45 @@ std::string record_line(const PlannedRun& run, const RunResult& result, std::uin
                         std::uint64_t series_bytes);
 std::string failure_line(const PlannedRun& run, std::string_view message);
 
+// What the records are read for: it decides what helps against those of another version.
+enum class RecordsFor {
+    running,  // by a command that has --overwrite
+    showing,  // by one that writes no records
+};
+
 // All records of some shards, the last of each run; failed ones where there is no other.
 class Records {
   public:
     // Reads every shard of the folders. What cannot be read, or is damaged, is left out, and stands in problems(). Throws
-    // Error(usage) when records are of another version of the statistics or of the random stream.
-    static Records read(const std::vector<std::filesystem::path>& folders);
+    // Error(usage) when records are of another version of the statistics or of the random stream: which, and what helps.
+    static Records read(const std::vector<std::filesystem::path>& folders,
+                        RecordsFor use = RecordsFor::running);
 
     // "PATH: what is wrong", one a file; the torn last record of a shard is no problem.
     const std::vector<std::string>& problems() const { return problems_; }
 
     const RunRecord* find(const std::string& id) const;
     std::size_t size() const { return runs_.size(); }
+    // Returns the number of records of each of the folders that were read; one of several folders counts in the last.
+    std::vector<std::uint64_t> sizes_of_folders() const;
+    std::size_t folder_of(const RunRecord& record) const { return files_[record.shard].folder; }
     // Returns the series of a run: kSeries one after the other, steps + 1 values each. Throws Error(io).
     std::vector<float> series(const RunRecord& record) const;
 
   private:
     friend class Shard;
+    struct SeriesFile {
+        std::filesystem::path path;
+        std::size_t folder;  // place among those that were read
+    };
     // Reads a shard, and gives back the bytes of its records and those of the series that they refer to. Throws Error(io)
     // when it cannot be opened.
-    std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path);
+    std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path, RecordsFor use);
 
     std::unordered_map<std::string, RunRecord> runs_;
     std::vector<std::string> problems_;
-    std::vector<std::filesystem::path> files_;  // of series, by RunRecord::shard
+    std::vector<SeriesFile> files_;  // by RunRecord::shard
+    std::size_t folders_ = 0;        // that were begun
 };
 
 // Removes the shards of a folder, or only the one of a number where `of` is above 1. Throws Error(io), also when another

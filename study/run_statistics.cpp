@@ -253,6 +253,7 @@ RunResult Measurement::result(const Judgement& judgement) const {
 
 std::size_t statistic_index(std::string_view name) {
     std::vector<std::string_view> names;
+    if (name == kCoverInFiles) name = "cover";
     for (std::size_t n = 0; n < kStatistics.size(); ++n) {
         if (kStatistics[n].name == name) return n;
         names.push_back(kStatistics[n].name);

@@ -42,6 +42,9 @@ inline constexpr std::array<StatisticInfo, 16> kStatistics{{
     {"pulse_period_s", "s", "period of a pulsing run"},
 }};
 
+// The name of `cover` in statistics.csv and in Python: users may give either.
+inline constexpr std::string_view kCoverInFiles = "cloud_cover";
+
 // Returns the place of a statistic in kStatistics. Throws Error(usage) that lists the names and says which was meant.
 std::size_t statistic_index(std::string_view name);
 

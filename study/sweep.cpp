@@ -213,7 +213,45 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
 }
 
 SweepPlan plan_of_folder(const std::filesystem::path& folder) {
-    return SweepPlan(read_sweep_file(folder / "sweep.toml"));
+    const std::filesystem::path file = folder / "sweep.toml";
+    std::error_code error;
+    if (!std::filesystem::exists(file, error))
+        throw Error(ErrorCode::io,
+                    folder.string() + ": is no folder of a sweep: it has no sweep.toml (expected the --out of "
+                                      "`nephos sweep`)");
+    return SweepPlan(read_sweep_file(file));
+}
+
+Records records_of_folders(const SweepPlan& plan, const std::vector<std::filesystem::path>& folders) {
+    for (const std::filesystem::path& folder : folders) {
+        std::error_code error;
+        if (!std::filesystem::is_directory(folder, error))
+            throw Error(ErrorCode::io, folder.string() + ": is no folder");
+    }
+    Records records = Records::read(folders, RecordsFor::showing);
+    const std::vector<std::uint64_t> all = records.sizes_of_folders();
+    std::vector<std::uint64_t> used(all.size(), 0);
+    for (std::uint64_t n = 0; n < plan.runs(); ++n)
+        if (const RunRecord* record = records.find(plan.run(n).id)) ++used[records.folder_of(*record)];
+    for (std::size_t n = 1; n < folders.size(); ++n) {
+        if (all[n] == 0 || used[n] > 0) continue;
+        throw Error(ErrorCode::usage,
+                    fmt::format("{0}: has {1} records, and none is of a run that {2}/sweep.toml asks for: it is of "
+                                "another scene or plan; leave it out (`nephos merge {0}` makes its own tables)",
+                                folders[n].string(), all[n], folders.front().string()));
+    }
+    return records;
+}
+
+std::uint64_t unused_records(const SweepPlan& plan, const Records& records) {
+    std::uint64_t used = 0;
+    for (std::uint64_t n = 0; n < plan.runs(); ++n) used += records.find(plan.run(n).id) != nullptr;
+    return records.size() - used;
+}
+
+void write_plan_of_tables(const SweepPlan& plan, const std::filesystem::path& folder) {
+    std::error_code error;
+    if (!std::filesystem::exists(folder / "shards", error)) place_plan(plan, folder);
 }
 
 }  // namespace nephos

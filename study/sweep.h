@@ -65,7 +65,18 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
 // Returns whether the folder has this plan.
 bool is_plan_of(const SweepPlan& plan, const std::filesystem::path& folder);
 
-// Reads the plan of a folder from its sweep file. Throws SceneErrors and Error(io).
+// Reads the plan of a folder from its sweep file. Throws SceneErrors and Error(io), also when it has none.
 SweepPlan plan_of_folder(const std::filesystem::path& folder);
+
+// Reads the records of several folders, to show them by the plan of the first. Throws Error(usage) when one of the others has
+// records, but none of a run of the plan: they are of another sweep. Throws as Records::read() and plan_of_folder().
+Records records_of_folders(const SweepPlan& plan, const std::vector<std::filesystem::path>& folders);
+
+// Returns how many records are of no run of the plan.
+std::uint64_t unused_records(const SweepPlan& plan, const Records& records);
+
+// Writes the plan and the scene beside tables that were made of the records of other folders, so that the commands which
+// stand in them work there. A folder with records has its own, and keeps them. Throws Error(io).
+void write_plan_of_tables(const SweepPlan& plan, const std::filesystem::path& folder);
 
 }  // namespace nephos

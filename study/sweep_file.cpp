@@ -46,6 +46,11 @@ void read_axis(TomlTable& table, SweepOptions& options) {
                      "expected values = [...], or range = { from = .., to = .., count = .. }");
 }
 
+// One name for one statistic, whichever the user gave. Throws as statistic_index().
+std::string statistic_name(std::string_view given) {
+    return std::string(kStatistics[statistic_index(given)].name);
+}
+
 void read_steps(TomlTable& table, StepRules& rules) {
     rules.min = table.integer("min", 20, kMaxSteps).value_or(rules.min);
     rules.max = table.integer("max", rules.min, kMaxSteps).value_or(std::max(rules.min, rules.max));
@@ -53,7 +58,8 @@ void read_steps(TomlTable& table, StepRules& rules) {
         StopAt stop;
         std::vector<std::string_view> names;
         for (const StatisticInfo& info : kStatistics) names.push_back(info.name);
-        stop.statistic = names[until.word("statistic", names).value_or(0)];
+        names.push_back(kCoverInFiles);
+        stop.statistic = statistic_name(names[until.word("statistic", names).value_or(0)]);
         stop.standard_error =
             until.number("standard_error", std::numeric_limits<double>::min(), kLargest).value_or(1);
         if (!until.has("statistic") || !until.has("standard_error"))
@@ -140,7 +146,9 @@ Axis parse_axis(const std::string& text) {
     const std::size_t colon = rest.find(':', dots);
     axis.from = parse_number(rest.substr(0, dots), text);
     axis.to = parse_number(rest.substr(dots + 2, colon == rest.npos ? colon : colon - dots - 2), text);
-    if (!(axis.to > axis.from)) fail("has an empty range");
+    if (!(axis.to > axis.from))
+        fail(fmt::format("has a range from {} to {}, which is not FROM below TO", number_text(axis.from),
+                         number_text(axis.to)));
     if (axis.scale == Scale::log && !(axis.from > 0))
         fail("has a range on a log scale that does not start above 0");
     if (colon != rest.npos) {
@@ -156,9 +164,8 @@ StopAt parse_stop(const std::string& text) {
     const std::size_t equals = text.find('=');
     if (equals == text.npos || !text.substr(0, equals).ends_with(".se"))
         throw Error(ErrorCode::usage, fmt::format("'{}' is not like cover.se=0.002", text));
-    const StopAt stop{text.substr(0, equals - 3),
+    const StopAt stop{statistic_name(text.substr(0, equals - 3)),
                       parse_number(std::string_view(text).substr(equals + 1), text)};
-    statistic_index(stop.statistic);
     if (!(stop.standard_error > 0))
         throw Error(ErrorCode::usage, fmt::format("'{}': a standard error is above 0", text));
     return stop;

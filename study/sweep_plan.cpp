@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <span>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -53,6 +55,23 @@ std::string canonical_value(const std::string& value) {
     return '"' + value + '"';
 }
 
+// Returns the text as one word of a POSIX shell: values of keys may have spaces, quotes and brackets.
+std::string shell_word(const std::string& text) {
+    const bool plain = std::ranges::all_of(text, [](char c) {
+        return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+               std::string_view("._-+=:/,").find(c) != std::string_view::npos;
+    });
+    if (plain) return text;
+    std::string word = "'";
+    for (const char c : text) {
+        if (c == '\'')
+            word += "'\\''";
+        else
+            word += c;
+    }
+    return word + "'";
+}
+
 std::uint64_t point_count(const SweepOptions& options) {
     if (is_sampled(options.design)) return options.points;
     if (options.axes.empty()) return 1;
@@ -63,6 +82,18 @@ std::uint64_t point_count(const SweepOptions& options) {
         if (count > kMaxPoints) return count;
     }
     return count;
+}
+
+// Two equal values of a grid would be points with the same runs.
+void require_different(const Axis& axis, const std::string& name) {
+    std::map<std::string_view, std::size_t> places;
+    for (std::size_t n = 0; n < axis.values.size(); ++n) {
+        const auto [first, is_new] = places.emplace(axis.values[n], n);
+        if (!is_new)
+            throw Error(ErrorCode::usage,
+                        fmt::format("{}: value {} is {}, and so is value {}: expected each value once", name, n + 1,
+                                    axis.values[n], first->second + 1));
+    }
 }
 
 void check_options(const SweepOptions& options) {
@@ -87,8 +118,11 @@ void check_options(const SweepOptions& options) {
             if (axis.scale == Scale::log && !(axis.from > 0))
                 fail(name + ": a range on a log scale starts above 0");
         } else if (axis.values.empty()) {
-            fail(name + ": has no values");
+            fail(fmt::format("{}: has a range without a number of values: expected {}=FROM..TO:COUNT, or --points N "
+                             "for a sampled design",
+                             name, joined_keys(axis)));
         }
+        if (options.design == Design::grid) require_different(axis, name);
         if (options.design == Design::list && axis.values.size() != options.axes.front().values.size())
             fail(fmt::format("{}: has {} values, the first axis {}: a list takes one of each for a point",
                              name, axis.values.size(), options.axes.front().values.size()));
@@ -147,6 +181,7 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     if (is_sampled(options_.design))
         unit_points_ = unit_points(options_.design, points_, options_.axes.size(), options_.seed);
     check_axes();
+    require_different_points();
     scene_.frames = {};  // of a study nothing is drawn
     scene_.frames.enabled = false;
     scene_text_ = nephos::to_toml(scene_);
@@ -171,6 +206,35 @@ void SweepPlan::check_axes() const {
     // Values that are good alone may contradict each other.
     if (points_ > 0) scene_of(run(0));
     if (points_ > 1) scene_of(run(runs() - 1));
+}
+
+// Points of a list, and those of a sample of whole numbers alone, may have all values in common: their runs would have the same
+// ids. Throws Error(usage) that names the first two.
+void SweepPlan::require_different_points() const {
+    const bool may_repeat = options_.design == Design::list ||
+                            (is_sampled(options_.design) && std::ranges::all_of(options_.axes, [](const Axis& axis) {
+                                 return axis.scale == Scale::integer;
+                             }));
+    if (!may_repeat || options_.axes.empty()) return;
+    std::vector<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>> hashes;
+    hashes.reserve(points_);
+    for (std::uint64_t point = 0; point < points_; ++point) {
+        const StateHash hash = hash_of_text(identity(values_of_point(point)));
+        hashes.emplace_back(hash.high, hash.low, point);
+    }
+    std::ranges::sort(hashes);
+    const auto twice = std::ranges::adjacent_find(hashes, [](const auto& a, const auto& b) {
+        return std::get<0>(a) == std::get<0>(b) && std::get<1>(a) == std::get<1>(b);
+    });
+    if (twice == hashes.end()) return;
+    const std::uint64_t point = std::get<2>(*twice);
+    std::string values = identity(values_of_point(point));
+    std::ranges::replace(values, '\n', ' ');
+    throw Error(ErrorCode::usage,
+                fmt::format("points {} and {} of the {} are the same: {}: expected each point once{}", point + 1,
+                            std::get<2>(*std::next(twice)) + 1, design_name(options_.design),
+                            values.substr(0, values.size() - 1),
+                            is_sampled(options_.design) ? ", as of the values of a grid, or fewer points" : ""));
 }
 
 std::vector<std::string> SweepPlan::values_of_point(std::uint64_t point) const {
@@ -231,12 +295,17 @@ Scene SweepPlan::scene_of(const PlannedRun& run) const {
     return scene;
 }
 
-std::string SweepPlan::command_of(const PlannedRun& run) const {
+std::string SweepPlan::options_of(const PlannedRun& run) const {
     std::string command;
     for (std::size_t n = 0; n < run.values.size(); ++n)
         for (const std::string& key : options_.axes[n].keys)
-            command += fmt::format("--set {}={} ", key, run.values[n]);
+            command += fmt::format("--set {} ", shell_word(key + "=" + run.values[n]));
     return command + fmt::format("--seed {}", run.seed);
+}
+
+std::string SweepPlan::command_of(const PlannedRun& run, std::uint64_t steps) const {
+    return fmt::format("nephos run scene.toml --statistics-only {} --set time.steps={} --out run-{}",
+                       options_of(run), steps, run.id.substr(0, 8));
 }
 
 std::string SweepPlan::to_toml() const {

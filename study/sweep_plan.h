@@ -92,13 +92,16 @@ class SweepPlan {
     PlannedRun run(std::uint64_t number) const;
     // Returns the scene of a run. Throws as read_scene().
     Scene scene_of(const PlannedRun& run) const;
-    // Returns the options of scene_of() as a command line that repeats the run: "--set KEY=VALUE ... --seed N".
-    std::string command_of(const PlannedRun& run) const;
+    // Returns the options of scene_of(), quoted for a shell: "--set KEY=VALUE ... --seed N".
+    std::string options_of(const PlannedRun& run) const;
+    // Returns the command that repeats so many steps of a run, in the folder of the sweep: "nephos run ...".
+    std::string command_of(const PlannedRun& run, std::uint64_t steps) const;
     // Returns the canonical sweep file; the scene that it names is scene_text().
     std::string to_toml() const;
 
   private:
     void check_axes() const;
+    void require_different_points() const;
     std::string identity(const std::vector<std::string>& values) const;
 
     SweepOptions options_;

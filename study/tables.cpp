@@ -26,6 +26,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kErrorsDiffer = 3;
 constexpr double kChance = 0.01;
+constexpr int kSeedDigits = 19;  // of 63 bits
 
 std::string field(double value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string(); }
 
@@ -119,7 +120,7 @@ std::uint64_t write_failures(const SweepPlan& plan, const Records& records,
             if (record == nullptr || !record->failed) continue;
             append(fmt::format("{},{},{}{},{},{},{}\n", run.id, run.point, run.replicate,
                                axis_fields(plan, run.values), run.seed, field(record->message),
-                               field("nephos run scene.toml --statistics-only " + plan.command_of(run))));
+                               field(plan.command_of(run, plan.options().steps.max))));
         }
     });
     return missing;
@@ -195,6 +196,17 @@ class UnpackedSeries {
     std::vector<float> current_;
 };
 
+// Names the auxiliary coordinates of every variable over runs that is not one of them (CF 1.8, section 5).
+void add_coordinates(std::vector<NetcdfVariable>& variables, const std::string& of_run) {
+    constexpr std::string_view kOfDimension[] = {"", " time", " height", " size_bin_begin"};
+    for (NetcdfVariable& variable : variables) {
+        const bool is_coordinate = (" " + of_run + " ").find(" " + variable.name + " ") != std::string::npos;
+        if (variable.dimensions.front() != 0 || is_coordinate) continue;
+        const std::size_t other = variable.dimensions.size() > 1 ? variable.dimensions[1] : 0;
+        variable.attributes.emplace_back("coordinates", of_run + std::string(kOfDimension[other]));
+    }
+}
+
 void write_series(const SweepPlan& plan, const Records& records, const std::filesystem::path& path) {
     std::vector<DoneRun> done;
     std::uint64_t steps = 0;
@@ -215,8 +227,10 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
                                                   {"step", steps + 1},
                                                   {"level", levels},
                                                   {"size_bin", bins},
-                                                  {"run_id_length", 32}};
+                                                  {"run_id_length", 32},
+                                                  {"seed_length", kSeedDigits}};
     std::vector<NetcdfVariable> variables;
+    std::string of_run = "run_id realization point seed";  // auxiliary coordinates
     const auto each_run = [&done](auto value) {
         return [&done, value](const Put& put) {
             for (const DoneRun& one : done) put(value(one));
@@ -230,6 +244,12 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
     variables.push_back(variable("realization", NetcdfType::int32, {0},
                                  described("1", "replicate of the point", "realization"),
                                  each_run([](const DoneRun& one) { return double(one.run.replicate); })));
+    // Text: the format has no whole numbers of 64 bits.
+    variables.push_back(variable("seed", NetcdfType::text, {0, 5}, {{"long_name", "seed of the run, a whole number"}},
+                                 [&](const Put& put) {
+                                     for (const DoneRun& one : done)
+                                         for (const char c : fmt::format("{:<{}}", one.run.seed, kSeedDigits)) put(c);
+                                 }));
     variables.push_back(variable("point", NetcdfType::int32, {0}, described("1", "point, as in points.csv"),
                                  each_run([](const DoneRun& one) { return double(one.run.point); })));
     variables.push_back(variable(
@@ -243,6 +263,7 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
             const std::string long_name = key;
             for (char& c : key)
                 if (c == '.' || c == '[' || c == ']') c = '_';
+            of_run += " " + key;
             variables.push_back(variable(key, NetcdfType::float64, {0}, {{"long_name", long_name}},
                                          each_run([axis](const DoneRun& one) {
                                              const std::string& text = one.run.values[axis];
@@ -305,6 +326,7 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
                          }
                      }));
     }
+    add_coordinates(variables, of_run);
     write_netcdf(path, dimensions,
                  {{"Conventions", "CF-1.8"}, {"title", "nephos sweep"}, {"source", "nephos " + version()}},
                  variables);

@@ -28,9 +28,12 @@ int report(const ReportArguments& a) {
     const ThreadLimit limit(1);
     const SweepPlan plan = plan_of_folder(a.folders.front());
     const Records records =
-        Records::read(std::vector<std::filesystem::path>(a.folders.begin(), a.folders.end()));
+        records_of_folders(plan, std::vector<std::filesystem::path>(a.folders.begin(), a.folders.end()));
     if (records.size() == 0)
-        throw Error(ErrorCode::usage, a.folders.front() + ": no run of this sweep is done yet");
+        throw Error(ErrorCode::usage,
+                    a.folders.front() +
+                        ": no run of this sweep is done yet, or its records are elsewhere: tables that `nephos "
+                        "merge` made are shown by `nephos report` of the folders that were merged");
     const std::filesystem::path out = a.out.empty() ? std::filesystem::path(a.folders.front()) / "report.html"
                                                     : std::filesystem::path(a.out);
     write_report(plan, records, out);

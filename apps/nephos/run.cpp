@@ -2,6 +2,8 @@
 
 // nephos run: a scene to density grids, pictures and statistics.
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <utility>
@@ -173,6 +175,19 @@ void print_json(const RunReport& report) {
     Output().line(json_text(json));
 }
 
+// "cover: steady; mean 0.3, standard error 0.002 after 600 steps", or why there is no mean.
+std::string until_text(const StopAt& until, const SeriesReport& series, std::uint64_t steps) {
+    std::string text = until.statistic + ": " + series.regime;
+    if (!std::isfinite(series.mean))
+        text += ", so it has no mean";
+    else if (!std::isfinite(series.error))
+        text += fmt::format("; mean {:.6g}, without a standard error", series.mean);
+    else
+        text += fmt::format("; mean {:.6g}, standard error {:.2g}", series.mean, series.error);
+    return fmt::format("{} after {} steps{}", text, steps,
+                       series.reached ? "" : ": not what --until asks for; give more --max-steps");
+}
+
 int run(const RunArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     if (a.checkpoint && !a.statistics_only)
@@ -206,7 +221,13 @@ int run(const RunArguments& a) {
     std::optional<SeriesReport> series;
     const auto run_all = [&] {
         if (!a.until) return run_scene(std::move(settings), observer);
-        const std::uint64_t most = a.max_steps.value_or(10 * settings.scene.steps);
+        const std::uint64_t least = settings.scene.steps;
+        const std::uint64_t most = a.max_steps.value_or(std::min(kMaxSteps, 10 * least));
+        if (most < least)
+            throw Error(ErrorCode::usage,
+                        fmt::format("--max-steps {}: the run takes `time.steps` = {} at least: expected as many or "
+                                    "more, or --set time.steps={} with it",
+                                    most, least, most));
         UntilReport until = run_until(std::move(settings), *a.until, most, observer);
         if (until.run.complete) series = until.series;
         return until.run;
@@ -223,11 +244,7 @@ int run(const RunArguments& a) {
     } else if (report.complete && !a.work.quiet) {
         print_report(report);
     }
-    if (series && !a.work.quiet)
-        print_note(fmt::format("{}: {}; mean {:.6g}, standard error {:.2g} after {} steps{}",
-                               a.until->statistic, series->regime, series->mean, series->error,
-                               report.last_step,
-                               series->reached ? "" : ": not what --until asks for; give more --max-steps"));
+    if (series && !a.work.quiet) print_note(until_text(*a.until, *series, report.last_step));
     if (report.complete) return series && !series->reached ? int(ErrorCode::check) : 0;
     print_note(fmt::format("stopped after {} of {} steps and {}; the same command with --resume goes on",
                            report.steps_reported == 0 ? 0 : report.steps_reported - 1, report.last_step,
@@ -273,7 +290,7 @@ void add_run_command(CLI::App& app, Action& action) {
               "of a mean "
               "is X, such as cover.se=0.002; exit status 1 when --max-steps do not do",
               [a](const std::string& text) { a->until = parse_stop(text); });
-    add_value(*command, "--max-steps", "N", "Most steps of --until (default: ten times time.steps)",
+    add_value(*command, "--max-steps", "N", "Most steps of --until, time.steps or more (default: ten times time.steps)",
               [a](const std::string& text) { a->max_steps = parse_unsigned(text, 1, kMaxSteps); });
     add_value(*command, "--checkpoint-every", "S",
               "Seconds between checkpoints (default: 60); Ctrl-C always leaves one",

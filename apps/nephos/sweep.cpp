@@ -83,7 +83,15 @@ SweepOptions options_of(const SweepArguments& a) {
     for (const std::string& axis : a.axes) options.axes.push_back(parse_axis(axis));
     if (a.design) options.design = *a.design;
     if (a.points) options.points = *a.points;
-    if (a.points && !a.design && options.design == Design::grid) options.design = Design::sobol;
+    if (a.points && !a.design && options.design == Design::grid) {
+        for (const Axis& axis : options.axes)
+            if (!axis.values.empty())
+                throw Error(ErrorCode::usage,
+                            fmt::format("--points {}: takes points from ranges, and the axis {} has values: expected "
+                                        "{}=FROM..TO, or a grid of its values without --points",
+                                        *a.points, fmt::join(axis.keys, "+"), fmt::join(axis.keys, "+")));
+        options.design = Design::sobol;
+    }
     if (a.replicates) options.replicates = std::uint32_t(*a.replicates);
     if (a.scene.seed) options.seed = *a.scene.seed;
     if (a.common_seeds) options.common_seeds = true;
@@ -133,6 +141,12 @@ void print_failures(const SweepReport& report, const std::string& folder) {
                         report.progress.failed, report.progress.in_all, folder));
 }
 
+void print_unused(std::uint64_t records, const std::string& folders) {
+    if (records > 0)
+        print_note(fmt::format("{}: {} records are of other points or rules; they stay, and are in no table",
+                               folders, records));
+}
+
 // What is wrong with shards that could not be read as a whole.
 void print_problems(const std::vector<std::string>& problems) {
     for (const std::string& problem : problems) print_error(problem);
@@ -157,8 +171,9 @@ void print_warnings_of_points(const SweepPlan& plan, const Records& records) {
             differ, plan.points()));
 }
 
+// `report`: the arguments of the command that shows the records.
 void write_and_print_tables(const SweepPlan& plan, const Records& records, const std::string& folder,
-                            bool quiet) {
+                            const std::string& report, bool quiet) {
     const std::uint64_t missing = write_tables(plan, records, folder);
     if (quiet) return;
     print_warnings_of_points(plan, records);
@@ -168,8 +183,8 @@ void write_and_print_tables(const SweepPlan& plan, const Records& records, const
         fmt::format("{0}/points.csv  a row a point: means, 95 % intervals, regimes\n"
                     "{0}/runs.csv    a row a run\n"
                     "{0}/series.nc   every step of every run (NetCDF)\n"
-                    "`nephos report {0}` shows them as one page",
-                    folder));
+                    "`nephos report {1}` shows them as one page",
+                    folder, report));
 }
 
 void check_memory_of(const SweepPlan& plan, int workers) {
@@ -207,7 +222,7 @@ int sweep(const SweepArguments& a) {
                                 human_count(report.progress.in_all), report.progress.failed));
         for (std::uint64_t n = 0; a.dry_run && n < std::min<std::uint64_t>(plan.runs(), 10); ++n)
             output.line(fmt::format("  point {} replicate {}: {}", plan.run(n).point, plan.run(n).replicate,
-                                    plan.command_of(plan.run(n))));
+                                    plan.options_of(plan.run(n))));
         if (a.dry_run && plan.runs() > 10)
             output.line(fmt::format("  ... and {} more", human_count(plan.runs() - 10)));
         return status;
@@ -232,9 +247,7 @@ int sweep(const SweepArguments& a) {
         [] { return pending_signal() != 0; });
     bar.reset();
     print_problems(report.problems);
-    if (report.unused > 0 && !a.work.quiet)
-        print_note(fmt::format("{}: {} records are of other points or rules; they stay, and are in no table",
-                               folder, report.unused));
+    if (!a.work.quiet) print_unused(report.unused, folder);
     if (a.work.json) output.line(json_text(report_json(plan, report, folder)));
     const bool quiet = a.work.quiet || a.work.json;
     if (pending_signal() != 0) {
@@ -249,7 +262,7 @@ int sweep(const SweepArguments& a) {
             throw Error(ErrorCode::io,
                         folder + ": another plan took the place of this one: no tables are written");
         const Records records = report.records ? std::move(*report.records) : Records::read({job.folder});
-        write_and_print_tables(plan, records, folder, quiet);
+        write_and_print_tables(plan, records, folder, folder, quiet);
     } else if (!quiet) {
         output.line(fmt::format("shard {} of {} is done; when all are, `nephos merge {}` makes the tables",
                                 job.shard, job.shards, folder));
@@ -270,7 +283,7 @@ int merge(const MergeArguments& a) {
     const ThreadLimit limit(1);
     const SweepPlan plan = plan_of_folder(a.folders.front());
     std::vector<std::filesystem::path> folders(a.folders.begin(), a.folders.end());
-    const Records records = Records::read(folders);
+    const Records records = records_of_folders(plan, folders);
     const std::string out = a.out.empty() ? a.folders.front() : a.out;
     print_problems(records.problems());
     const LostRuns lost = a.overwrite ? LostRuns{} : runs_lost(plan, records, out);
@@ -284,7 +297,12 @@ int merge(const MergeArguments& a) {
                     fmt::format("{}/runs.csv has {} runs that {}/sweep.toml does not ask for: the tables of "
                                 "another plan stay as they are; --overwrite replaces them",
                                 out, lost.of_another_plan, a.folders.front()));
-    write_and_print_tables(plan, records, out, a.work.quiet);
+    const std::string sources = fmt::format("{}", fmt::join(a.folders, " "));
+    if (!a.work.quiet) print_unused(unused_records(plan, records), sources);
+    const bool in_place = a.folders.size() == 1 && out == a.folders.front();
+    if (!in_place) write_plan_of_tables(plan, out);
+    write_and_print_tables(plan, records, out,
+                           in_place ? out : fmt::format("{} --out {}/report.html", sources, out), a.work.quiet);
     return records.problems().empty() ? 0 : int(ErrorCode::io);
 }
 

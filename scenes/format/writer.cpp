@@ -215,10 +215,7 @@ std::string to_toml(const Scene& scene) {
 }
 
 std::vector<std::pair<std::string, std::string>> parameters(const Scene& scene) {
-    const Parameters defaults = flattened(to_toml(Scene{}));
-    Parameters changed = flattened(to_toml(scene));
-    std::erase_if(changed, [&](const auto& key) { return std::ranges::count(defaults, key) > 0; });
-    return changed;
+    return flattened(to_toml(scene));
 }
 
 std::string scene_hash(const Scene& scene) {

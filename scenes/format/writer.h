@@ -28,8 +28,8 @@ std::string scene_hash(const Scene& scene);
 // of the state in it as `initial_state_hash`.
 std::string simulation_hash(const Scene& scene, std::string_view initial_state_hash = {});
 
-// Returns the keys in which the scene differs from one with defaults alone, as pairs of path and TOML text in the order of
-// the reference: ("field.background.ext", "0.12"), ("field.scatters[0].count", "40"). With them and the defaults a scene is
+// Returns every key of the scene, those at their defaults too, as pairs of path and TOML text in the order of
+// the reference: ("field.background.ext", "0.12"), ("field.scatters[0].count", "40"). With them a scene is
 // complete. Thread-safe.
 std::vector<std::pair<std::string, std::string>> parameters(const Scene& scene);
 

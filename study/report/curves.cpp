@@ -22,9 +22,7 @@ constexpr std::array<std::string_view, 10> kAlongAxes{
     "cloud_area_m2", "correlation_length_m", "overlap",     "lifetime_s", "size_exponent"};
 
 std::string values_text(const ReportPoint& point) {
-    std::vector<std::string> values;
-    for (const std::string& value : point.summary.values) values.push_back(value);
-    return values.empty() ? "the scene" : fmt::format("{}", fmt::join(values, ", "));
+    return point.labels.empty() ? "the scene" : fmt::format("{}", fmt::join(point.labels, ", "));
 }
 
 // Points of a grid that differ in one axis alone, by the places on the others.
@@ -161,7 +159,7 @@ std::string series_figure(const ReportData& data, const ReportPoint& point) {
                         "json\">{{\"colour\":\"{}\",\"warmUp\":{},\"data\":[{},{},{},{}]}}</script>\n",
                         colour, warm_up, json_array(s.steps), json_array(s.mean), json_array(s.low),
                         json_array(s.high)),
-        fmt::format("<a href=\"#p{}\">{}</a> ({})", point.summary.point, html(point.name(data.plan)),
+        fmt::format("<a href=\"#p{}\">{}</a> ({})", point.summary.point, html(point.short_name(data.plan)),
                     regime_name(main_regime(point.summary))),
         "series");
 }

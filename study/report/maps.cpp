@@ -58,14 +58,30 @@ std::string cell(const ReportData& data, const ReportPoint& point, const Box& bo
     return text + "</a>\n";
 }
 
-// One panel of a grid: the first axis to the right, the second upwards, the others fixed.
+std::string title_of_axis(double x, double y, std::string_view anchor, const Axis& axis) {
+    return fmt::format("<text style=\"font-weight:600;text-anchor:{}\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", anchor, x, y,
+                       html(axis_title(axis)));
+}
+
+double widest(const std::vector<std::string>& labels) {
+    double width = 0;
+    for (const std::string& label : labels) width = std::max(width, text_width(label));
+    return width;
+}
+
+// One panel of a grid: the first axis to the right, the second upwards, the others fixed. The title of the second stands above
+// it, where it has room.
 std::string panel(const ReportData& data, const std::vector<std::size_t>& fixed, double max_width) {
     const std::vector<Axis>& axes = data.plan.options().axes;
     const std::size_t nx = axes[0].values.size(), ny = axes.size() > 1 ? axes[1].values.size() : 1;
-    const Box box{ny > 1 ? 70.0 : 10.0, 8, std::min(max_width / double(nx), 64.0),
+    const std::vector<std::string> x_labels = axis_labels(axes[0].values),
+                                   y_labels = ny > 1 ? axis_labels(axes[1].values) : std::vector<std::string>();
+    const Box box{widest(y_labels) + 10, ny > 1 ? 22.0 : 8.0, std::min(max_width / double(nx), 64.0),
                   std::min(420.0 / double(ny), 34.0)};
     const double bottom = box.y + box.height * double(ny), right = box.x + box.width * double(nx);
-    const double svg_width = std::max(right + 10, 220.0);
+    double title_width = text_width(axis_title(axes[0]));
+    if (ny > 1) title_width = std::max(title_width, text_width(axis_title(axes[1])));
+    const double svg_width = std::max({right + widest(x_labels) / 2, title_width + 10, 220.0});
     std::string text = fmt::format(
         "<svg viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
         "role=\"img\" aria-label=\"Regimes\">\n",
@@ -79,24 +95,21 @@ std::string panel(const ReportData& data, const std::vector<std::size_t>& fixed,
             text += cell(data, data.points[(i * ny + j) * rest + offset],
                          {box.x + double(i) * box.width, box.y + double(ny - 1 - j) * box.height, box.width,
                           box.height});
-    const auto label = [](const std::string& value) { return html(value); };
-    const std::size_t each_x = std::size_t(std::ceil(44 / box.width)),
+    const auto label = [](std::string_view kind, double x, double y, const std::string& shown,
+                          const std::string& value) {
+        return fmt::format("<text class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\">{}<title>{}</title></text>\n", kind, x, y,
+                           html(shown), html(value));
+    };
+    const std::size_t each_x = std::size_t(std::ceil((widest(x_labels) + 6) / box.width)),
                       each_y = std::size_t(std::ceil(12 / box.height));
     for (std::size_t i = 0; i < nx; i += each_x)
-        text += fmt::format("<text class=\"x\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
-                            box.x + (double(i) + 0.5) * box.width, bottom + 13, label(axes[0].values[i]));
-    text += fmt::format("<text class=\"label\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
-                        std::max((box.x + right) / 2, 110.0), bottom + 31,
-                        label(fmt::format("{}", fmt::join(axes[0].keys, "+"))));
-    if (ny > 1) {
-        for (std::size_t j = 0; j < ny; j += each_y)
-            text +=
-                fmt::format("<text class=\"y\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", box.x - 5,
-                            box.y + (double(ny - 1 - j) + 0.5) * box.height + 4, label(axes[1].values[j]));
-        text +=
-            fmt::format("<text class=\"label\" transform=\"translate(12 {:.1f}) rotate(-90)\">{}</text>\n",
-                        (box.y + bottom) / 2, label(fmt::format("{}", fmt::join(axes[1].keys, "+"))));
-    }
+        text += label("x", box.x + (double(i) + 0.5) * box.width, bottom + 13, x_labels[i], axes[0].values[i]);
+    const double half_title = text_width(axis_title(axes[0])) / 2;
+    text += title_of_axis(std::max((box.x + right) / 2, half_title + 4), bottom + 31, "middle", axes[0]);
+    for (std::size_t j = 0; j < y_labels.size(); j += each_y)
+        text += label("y", box.x - 5, box.y + (double(ny - 1 - j) + 0.5) * box.height + 4, y_labels[j],
+                      axes[1].values[j]);
+    if (ny > 1) text += title_of_axis(4, 12, "start", axes[1]);
     return text + "</svg>\n";
 }
 
@@ -240,7 +253,7 @@ std::string thumbnails(const ReportData& data) {
             "<a href=\"#p{}\"><img alt=\"Point {} from above\" "
             "src=\"data:image/png;base64,{}\"><span>{}{}</span></a>\n",
             point.summary.point, point.summary.point, point.records[0]->result.thumbnail,
-            html(point.name(data.plan)),
+            html(point.short_name(data.plan)),
             std::isfinite(cover.mean) ? "<br>cover " + number_text(cover.mean, 3) : "");
     }
     return text + "</div>\n<p>" + choice_text(chosen.size(), shown.size()) +

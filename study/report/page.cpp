@@ -163,11 +163,10 @@ std::string row(const ReportData& data, const ReportPoint& point) {
     text += "<td><details><summary>commands</summary><pre>";
     for (std::size_t n = 0; n < point.runs.size(); ++n) {
         const RunRecord* record = point.records[n];
-        text += html("nephos run scene.toml --statistics-only " + data.plan.command_of(point.runs[n])) +
-                fmt::format(" --set time.steps={} --out run-{}\n",
-                            record != nullptr && !record->failed ? record->result.steps
-                                                                 : data.plan.options().steps.max,
-                            point.runs[n].id.substr(0, 8));
+        const bool done = record != nullptr && !record->failed;
+        text += html(data.plan.command_of(point.runs[n],
+                                          done ? record->result.steps : data.plan.options().steps.max)) +
+                '\n';
     }
     return text + "</pre></details></td></tr>\n";
 }

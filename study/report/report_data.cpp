@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,7 @@ namespace nephos::report {
 namespace {
 
 constexpr double kWideInterval = 0.1;  // of the mean
+constexpr int kFewestDigits = 3, kLabelDigits = 4, kAllDigits = 17;  // of labels
 constexpr double kLogRatio = 20;  // values above 0 that differ more than this are drawn on a logarithmic axis
 
 std::string unquoted(const std::string& value) {
@@ -25,37 +27,84 @@ bool number_of(const std::string& text, double& number) {
     return error == std::errc() && end == text.data() + text.size();
 }
 
+std::string joined_name(const SweepPlan& plan, const std::vector<std::string>& values) {
+    std::vector<std::string> parts;
+    for (std::size_t n = 0; n < values.size(); ++n)
+        parts.push_back(
+            fmt::format("{}={}", fmt::join(plan.options().axes[n].keys, "+"), unquoted(values[n])));
+    return parts.empty() ? "the scene" : fmt::format("{}", fmt::join(parts, ", "));
+}
+
+// Gives every point the labels of its values.
+void label_points(ReportData& data) {
+    const std::vector<Axis>& axes = data.plan.options().axes;
+    for (std::size_t axis = 0; axis < axes.size(); ++axis) {
+        std::vector<std::string> values;
+        for (const ReportPoint& point : data.points) values.push_back(point.summary.values[axis]);
+        // Points of a sample need no label that tells them apart: a figure shows few of them.
+        const std::vector<std::string> labels =
+            axis_labels(values, axes[axis].values.empty() ? kLabelDigits : kAllDigits);
+        for (std::size_t n = 0; n < labels.size(); ++n) data.points[n].labels.push_back(labels[n]);
+    }
+}
+
 }  // namespace
+
+std::vector<std::string> axis_labels(const std::vector<std::string>& values, int most) {
+    const std::set<std::string> different(values.begin(), values.end());
+    std::vector<std::string> labels;
+    for (int digits = kFewestDigits; digits <= most; ++digits) {
+        labels.clear();
+        for (const std::string& value : values) {
+            double number = 0;
+            labels.push_back(number_of(value, number) ? short_number(number, digits) : unquoted(value));
+        }
+        if (std::set<std::string>(labels.begin(), labels.end()).size() == different.size()) break;
+    }
+    return labels;
+}
+
+std::string axis_title(const Axis& axis) {
+    const std::size_t dot = axis.keys.front().rfind('.');
+    const std::string section = axis.keys.front().substr(0, dot == std::string::npos ? 0 : dot + 1);
+    const bool together = axis.keys.size() > 1 && !section.empty() &&
+                          std::ranges::all_of(axis.keys, [&](const std::string& key) {
+                              return key.starts_with(section) && key.find('.', section.size()) == key.npos;
+                          });
+    if (!together) return fmt::format("{}", fmt::join(axis.keys, "+"));
+    std::vector<std::string> names;
+    for (const std::string& key : axis.keys) names.push_back(key.substr(section.size()));
+    return fmt::format("{}{{{}}}", section, fmt::join(names, ","));
+}
 
 const PointMean& ReportPoint::mean(std::string_view statistic) const {
     return summary.statistics[statistic_index(statistic)];
 }
 
 std::string ReportPoint::name(const SweepPlan& plan) const {
-    std::vector<std::string> parts;
-    for (std::size_t n = 0; n < summary.values.size(); ++n)
-        parts.push_back(
-            fmt::format("{}={}", fmt::join(plan.options().axes[n].keys, "+"), unquoted(summary.values[n])));
-    return parts.empty() ? "the scene" : fmt::format("{}", fmt::join(parts, ", "));
+    return joined_name(plan, summary.values);
 }
+
+std::string ReportPoint::short_name(const SweepPlan& plan) const { return joined_name(plan, labels); }
 
 ReportData gather(const SweepPlan& plan, const Records& records) {
     ReportData data{plan, records, automaton_options(plan.scene(), plan.measured_lattice()), {}};
     const std::uint32_t replicates = plan.options().replicates;
     for (std::uint64_t number = 0; number < plan.points(); ++number) {
-        ReportPoint point{summarise(plan, records, number), {}, {}};
+        ReportPoint point{summarise(plan, records, number), {}, {}, {}};
         for (std::uint32_t replicate = 0; replicate < replicates; ++replicate) {
             point.runs.push_back(plan.run(number * replicates + replicate));
             point.records.push_back(records.find(point.runs.back().id));
         }
         data.points.push_back(std::move(point));
     }
+    label_points(data);
     return data;
 }
 
 SweepAxis sweep_axis(const ReportData& data, std::size_t axis) {
     SweepAxis found;
-    const std::string label = fmt::format("{}", fmt::join(data.plan.options().axes[axis].keys, "+"));
+    const std::string label = axis_title(data.plan.options().axes[axis]);
     bool numbers = true, positive = true;
     for (const ReportPoint& point : data.points) {
         double number = 0;

@@ -20,9 +20,12 @@ struct ReportPoint {
     PointSummary summary;
     std::vector<PlannedRun> runs;           // of each replicate
     std::vector<const RunRecord*> records;  // of the same runs; null where one is missing
+    std::vector<std::string> labels;        // the values as figures show them (axis_labels())
     const PointMean& mean(std::string_view statistic) const;
     // Returns "field.background.ext=0.1", with a comma between axes; "the scene" of a sweep without axes.
     std::string name(const SweepPlan& plan) const;
+    // Returns the same with the labels instead of the values.
+    std::string short_name(const SweepPlan& plan) const;
 };
 
 struct ReportData {
@@ -33,6 +36,13 @@ struct ReportData {
 };
 
 ReportData gather(const SweepPlan& plan, const Records& records);
+
+// Returns labels of the values of an axis: numbers with as few digits as tell them apart, at least 3 and at most `most`; words
+// without quotes.
+std::vector<std::string> axis_labels(const std::vector<std::string>& values, int most = 17);
+
+// Returns the keys of an axis as the title of a figure's axis: "field.background.{act,hum}" of two that move together.
+std::string axis_title(const Axis& axis);
 
 // An axis of the sweep as one of figures, with the value of each point on it.
 struct SweepAxis {

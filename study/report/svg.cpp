@@ -14,7 +14,8 @@ namespace nephos::report {
 namespace {
 
 constexpr int kTickDigits = 4;
-constexpr int kNameWidth = 7;  // of a letter of a legend, at most
+constexpr double kLetterWidth = 6.6;  // of 11 pixels high sans serif, of digits and small letters
+constexpr int kLegendLine = 13, kLegendMark = 14;
 
 // Returns the step of round numbers, 1, 2 or 5 times a power of ten, that cuts a range into at most `count` parts.
 double round_step(double range, int count) {
@@ -55,6 +56,22 @@ std::string html(std::string_view text) {
         }
     }
     return safe;
+}
+
+std::string short_number(double value, int digits) {
+    std::string text = number_text(value, digits);
+    for (const std::string_view zero : {"e-0", "e+0"})
+        if (const std::size_t at = text.find(zero); at != text.npos) text.erase(at + 2, 1);
+    return text;
+}
+
+double text_width(std::string_view text) {
+    std::size_t letters = 0;
+    while (!text.empty()) {
+        text.remove_prefix(character_at(text, 0).bytes.size());
+        ++letters;
+    }
+    return kLetterWidth * double(letters);
 }
 
 std::string colour_between(double at) {
@@ -111,10 +128,7 @@ std::vector<double> PlotAxis::ticks(int count) const {
 
 std::string PlotAxis::tick_label(double tick) const {
     if (!names.empty()) return names[std::size_t(tick)];
-    std::string text = number_text(std::abs(tick) < 1e-9 * (to - from) ? 0 : tick, kTickDigits);
-    const std::size_t zero = text.find("e-0");
-    if (zero != text.npos) text.erase(zero + 2, 1);
-    return text;
+    return short_number(std::abs(tick) < 1e-9 * (to - from) ? 0 : tick, kTickDigits);
 }
 
 PlotAxis axis_over(std::string label, std::span<const double> values, bool log, bool zero) {
@@ -204,26 +218,24 @@ void Figure::shade(double from, double to, std::string_view title) {
 }
 
 void Figure::legend(std::span<const std::pair<std::string, std::string>> colours_and_names) {
-    std::size_t longest = 0;
-    for (const auto& [colour, name] : colours_and_names) longest = std::max(longest, name.size());
-    const int wide = 30 + int(longest) * kNameWidth;
-    over_ += fmt::format("<rect class=\"behind\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n",
-                         width_ - kRight - wide, kTop + 1, wide, 13 * colours_and_names.size() + 4);
-    int y = kTop + 13;
+    double longest = 0;
+    const int left = width_ - kRight + 10;
+    int y = kTop + 9;
     for (const auto& [colour, name] : colours_and_names) {
+        longest = std::max(longest, text_width(name));
         over_ += fmt::format(
-            "<path class=\"line\" stroke=\"{}\" d=\"M{} {}h14\"/>"
-            "<text class=\"name\" x=\"{}\" y=\"{}\">{}</text>\n",
-            colour, width_ - kRight - 18, y - 4, width_ - kRight - 22, y, html(name));
-        y += 13;
+            "<path class=\"line\" stroke=\"{}\" d=\"M{} {}h{}\"/><text x=\"{}\" y=\"{}\">{}</text>\n", colour,
+            left, y - 4, kLegendMark, left + kLegendMark + 5, y, html(name));
+        y += kLegendLine;
     }
+    legend_width_ = kLegendMark + 5 + int(std::ceil(longest));
 }
 
 std::string Figure::svg(std::string_view description) const {
     const int bottom = height_ - kBottom, right = width_ - kRight;
     std::string text = fmt::format(
         "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"{2}\">\n",
-        width_, height_, html(description));
+        width_ + legend_width_, height_, html(description));
     for (const double tick : x_.ticks(6)) {
         const double x = x_of(tick);
         text += fmt::format(

@@ -13,6 +13,12 @@ namespace nephos::report {
 // Returns the text with the characters that HTML reads as markup replaced; it may stand in an element or in quotes.
 std::string html(std::string_view text);
 
+// Returns a number with at most so many digits as a label: "0.00122", "1e-5".
+std::string short_number(double value, int digits);
+
+// Returns about how wide a text is in figures, in pixels, at most.
+double text_width(std::string_view text);
+
 // Returns the place of a colour between two ends, dark blue at 0 to yellow at 1 ("#440154"), which stays readable in
 // grey and for colour-blind eyes; grey where `at` is not a number.
 std::string colour_between(double at);
@@ -56,7 +62,7 @@ class Figure {
     void bar(double x, double low, double high, std::string_view colour);
     // Shades all between two values of the x axis.
     void shade(double from, double to, std::string_view title);
-    // Names the lines in the figure's upper right corner.
+    // Names the lines to the right of the frame, and widens the figure for it: no curve is covered.
     void legend(std::span<const std::pair<std::string, std::string>> colours_and_names);
 
     std::string svg(std::string_view description) const;
@@ -67,6 +73,7 @@ class Figure {
 
     PlotAxis x_, y_;
     int width_, height_;
+    int legend_width_ = 0;
     std::string content_, over_;
     static constexpr int kLeft = 68, kRight = 14, kTop = 12, kBottom = 42;
 };

@@ -85,6 +85,7 @@ class Sweep:
     def __init__(self, folder):
         """Raises Error where the folder has no tables."""
         self.folder = pathlib.Path(folder)
+        self._records = [self.folder]  # folders that have the records of its runs
         if not (self.folder / "runs.csv").is_file():
             raise _error(f"{self.folder}: has no runs.csv; `nephos merge` makes it from shards", "io")
 
@@ -111,7 +112,7 @@ class Sweep:
     def report(self, path=None):
         """Writes the sweep as one HTML page, and returns its path (report.html in the folder by default)."""
         path = pathlib.Path(path) if path is not None else self.folder / "report.html"
-        _call(["report", self.folder, "--out", path, "--quiet"])
+        _call(["report", *self._records, "--out", path, "--quiet"])
         return path
 
     @property
@@ -191,7 +192,9 @@ def merge(folders, out=None, *, overwrite=False):
     folders = [folders] if isinstance(folders, (str, os.PathLike)) else list(folders)
     out = folders[0] if out is None else out
     _call(["merge", *folders, "--out", out, "--quiet", *_flags(False, overwrite)])
-    return Sweep(out)
+    sweep = Sweep(out)
+    sweep._records = folders
+    return sweep
 
 
 def fit(path, out, *, workers=None, retry_failed=False, overwrite=False):

@@ -3,10 +3,12 @@
 a browser (Chromium, headless) with and without scripts."""
 
 import csv
+import html
 import http.server
 import json
 import pathlib
 import re
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -162,6 +164,37 @@ class Report(Case):
         self.sweep("a")
         self.refused(3, "report", "a", "--out", "null.toml/x.html", says="null.toml")
 
+    def test_figures_can_be_read(self):
+        """Texts of figures are inside of them, on no other text, and curves are under no legend; values are short."""
+        self.sweep("a", axes=("field.background.ext+field.background.hum=log:1e-3..4e-3:5", "field.background.act=log:1e-4..1e-2:4"))
+        page = self.page("a")
+        self.assertIn(">0.00141<title>0.00141421356237</title>", page)
+        self.assertIn(">0.000464<title>0.000464158883361</title>", page)
+        self.assertIn(">field.background.{ext,hum}<", page)
+        script = """<script>
+        const wrong = [];
+        const apart = (a, b) => a.right <= b.left + 1 || b.right <= a.left + 1 || a.bottom <= b.top + 3 || b.bottom <= a.top + 3;
+        for (const name of ["Regimes", "Vertical profiles", "Sizes of clouds"])
+            for (const svg of document.querySelectorAll(`svg[aria-label="${name}"]`)) {
+                const all = svg.getBoundingClientRect(), frame = svg.querySelector("path.frame")?.getBoundingClientRect();
+                const texts = [...svg.querySelectorAll("text")].map((t) => [t.firstChild.data, t.getBoundingClientRect()]);
+                texts.forEach(([words, box], n) => {
+                    if (box.left < all.left - 1 || box.right > all.right + 1 || box.top < all.top - 1 || box.bottom > all.bottom + 1)
+                        wrong.push(`${name}: ${words} is outside`);
+                    for (const [other, place] of texts.slice(0, n))
+                        if (!apart(box, place)) wrong.push(`${name}: ${words} is on ${other}`);
+                    if (frame && !apart(box, frame)) wrong.push(`${name}: ${words} is on the curves`);
+                });
+                if (texts.length < 5) wrong.push(`${name}: few texts`);
+            }
+        document.body.dataset.wrong = JSON.stringify(wrong);
+        document.body.dataset.figures = document.querySelectorAll('svg[aria-label="Regimes"]').length;
+        </script></body>"""
+        dom, console, _ = self.browse(self.write("checked.html", page.replace("</body>", script)), "--dump-dom")
+        self.assertEqual(console, [])
+        self.assertIn('data-figures="1"', dom)
+        self.assertIn('data-wrong="[]"', dom, re.findall(r'data-wrong="[^"]*"', dom))
+
     def test_samples_lists_and_names_are_drawn(self):
         self.sweep("sobol", "--design", "sobol", "--points", "6",
                    axes=("field.background.ext=0.05..0.2", "field.background.act=log:1e-4..1e-2"))
@@ -172,6 +205,10 @@ class Report(Case):
         page = self.page("names")
         self.assertEqual(Tags(page).wrong, [])
         self.assertIn(">field<", page)
+        command = html.unescape(re.search(r"nephos (run scene\.toml .*)", page).group(1))
+        self.assertIn("""--set 'lattice.initial="empty"' --seed""", command)
+        words = shlex.split(command)
+        self.call(words[0], "names/scene.toml", *words[2:])
         self.call("sweep", self.write("null.toml", NULL), "--replicates", "1", "--steps", "200", "--out", "alone")
         page = self.page("alone")
         self.assertEqual(Tags(page).wrong, [])

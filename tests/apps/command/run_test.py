@@ -95,6 +95,20 @@ class Run(Case):
         shutil.copy(self.folder / "out/density/tiny_0001.vdb", self.folder / "a.exr")
         self.assertEqual(json.loads(self.call("info", "--json", "a.exr").stdout)["kind"], "vdb")
 
+    def test_damaged_statistics_have_a_way_on(self):
+        """A complete run with a row too few, and with a checkpoint to go on from: nothing is lost, and the cure helps."""
+        for more in ([], ["--checkpoint"]):
+            command = ("run", self.scene, "--statistics-only", *more, "--out", "rows", "--overwrite")
+            self.call(*command)
+            table = self.folder / "rows/statistics.csv"
+            whole = table.read_bytes()
+            table.write_bytes(whole.replace(b"\n3,", b"\n4,"))
+            before = {path: path.read_bytes() for path in (self.folder / "rows").iterdir()}
+            self.refused(3, *command[:-1], "--resume", says="--overwrite instead of --resume starts the run anew")
+            self.assertEqual({path: path.read_bytes() for path in (self.folder / "rows").iterdir()}, before)
+            self.call(*command)
+            self.assertEqual(table.read_bytes(), whole)
+
 
 class Memory(Case):
     SKIES = {"overcast": (0.9, 0.6, 0), "fair": (0.1, 0.0005, 0.3)}

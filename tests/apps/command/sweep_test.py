@@ -8,6 +8,7 @@ import os
 import pathlib
 import re
 import resource
+import shlex
 import shutil
 import signal
 import subprocess
@@ -142,6 +143,74 @@ direction_deg = 90
         for first, second in (("here", "there"), ("there", "here")):
             self.call("merge", first, second, "--out", "merged")
             self.assertEqual(self.tables("merged"), expected)
+
+    def test_the_advice_of_merge_works(self):
+        """Tables beside no records: the page is made where the records are, and the commands in the tables have their scene."""
+        for shard, folder in enumerate(("here", "there")):
+            self.sweep(folder, "--shard", f"{shard}/2", steps="100")
+        said = self.call("merge", "here", "there", "--out", "tables").stdout
+        advice = re.search(r"`nephos (report [^`]*)` shows them", said).group(1)
+        self.call(*shlex.split(advice))
+        self.assertIn("9 done, 0 failed, 0 missing", (self.folder / "tables/report.html").read_text())
+        for name in ("scene.toml", "sweep.toml"):
+            self.assertEqual((self.folder / "tables" / name).read_bytes(), (self.folder / "here" / name).read_bytes())
+        self.refused(2, "report", "tables", says="`nephos report` of the folders that were merged")
+        # In place the folder alone will do.
+        said = self.call("merge", "here").stdout
+        self.call(*shlex.split(re.search(r"`nephos (report [^`]*)` shows them", said).group(1)))
+        self.assertTrue((self.folder / "here/report.html").exists())
+        # A folder of records keeps its own plan.
+        self.sweep("other", steps="120", axis="field.background.ext=0.3")
+        plan = (self.folder / "other/sweep.toml").read_bytes()
+        self.call("merge", "here", "there", "--out", "other", "--overwrite")
+        self.assertEqual((self.folder / "other/sweep.toml").read_bytes(), plan)
+
+    def test_records_of_another_sweep_are_not_left_out_in_silence(self):
+        self.sweep("one", steps="100")
+        other = self.write("other.toml", NULL.replace("act = 0.002", "act = 0.003"))
+        self.call("sweep", other, "--axis", "field.background.ext=0.3", "--replicates", "2", "--steps", "100", "--out", "k")
+        for command in (("merge", "one", "k", "--out", "m"), ("report", "one", "k", "--out", "m/report.html")):
+            self.refused(2, *command, says="k: has 2 records, and none is of a run that one/sweep.toml asks for")
+        self.assertFalse((self.folder / "m").exists())
+        # Some points more are no other sweep, but they are counted.
+        self.sweep("more", steps="100", axis="field.background.ext=0.1,0.4")
+        said = self.call("merge", "one", "more", "--out", "m")
+        self.assertIn("one more: 3 records are of other points or rules", said.stderr)
+        self.assertNotIn("records are of", self.call("merge", "one").stderr)
+
+    def test_records_of_another_version_are_refused_with_a_cure_that_works(self):
+        self.sweep("old", steps="100")
+        before = self.tables("old")
+        shard = self.folder / "old/shards/0000-of-0001.jsonl"
+        lines = []
+        for line in shard.read_text().splitlines():
+            text = re.sub(r'"statistics_version":\d+', '"statistics_version":1', line.rsplit(',"xxh3":"', 1)[0])
+            lines.append(f'{text},"xxh3":"{xxhash.xxh3_128(text.encode()).hexdigest()}"}}\n')
+        shard.write_text("".join(lines))
+        self.assertIn("choose another --out, or give --overwrite", self.sweep("old", steps="100", status=2).stderr)
+        for command in (("merge", "old"), ("merge", "old", "--overwrite"), ("report", "old")):
+            said = self.refused(2, *command, says="0000-of-0001.jsonl: has records of version 1 of the statistics").stderr
+            self.assertRegex(said, r"and this nephos makes versions \d+ and \d+: leave old out")
+            cure = re.search(r"`nephos (sweep [^`]*)`", said).group(1)
+        self.call(*shlex.split(cure))
+        self.assertEqual(self.tables("old"), before)
+
+    def test_equal_points_are_refused(self):
+        """Their runs would have the same ids and seeds."""
+        plan = self.write("plan.toml", 'scene = "null.toml"\n[[axis]]\nkey = "field.background.ext"\nvalues = [0.1, 0.2, 0.10]\n')
+        for arguments, says in (([self.null, "--axis", "field.background.ext=0.1,0.2,1e-1"], "value 3 is 0.1, and so is value 1"),
+                                ([plan], "value 3 is 0.1, and so is value 1"),
+                                ([self.null, "--design", "list", "--axis", "field.background.ext=0.1,0.2,0.10", "--axis",
+                                  "field.background.act=0.01,0.02,1e-2"],
+                                 "points 1 and 3 of the list are the same: field.background.act=0.01 field.background.ext=0.1"),
+                                ([self.null, "--axis", "density.refine=integer:1..2", "--points", "3"], "of the sobol are the same")):
+            with self.subTest(arguments=arguments):
+                self.assertIn(says, self.call("sweep", *arguments, "--out", "twice", status=2).stderr)
+        self.assertFalse((self.folder / "twice").exists())
+        # A value of a list may come again with another one of a second axis.
+        pairs = self.call("sweep", self.null, "--axis", "field.background.ext=0.1,0.1", "--axis",
+                          "field.background.act=0.01,0.02", "--design", "list", "--dry-run", "-r", "1")
+        self.assertIn("2 points", pairs.stdout)
 
     def test_a_grown_axis_computes_only_what_is_new(self):
         self.sweep("grown", "-j", "2", axis="field.background.ext=0.2,0.05")
@@ -345,7 +414,9 @@ direction_deg = 90
         self.assertEqual([run["status"] for run in rows(self.folder / "crash/runs.csv")], ["failed", "done"])
         failure = rows(self.folder / "crash/failures.csv")[0]
         self.assertIn("signal 9", failure["message"])
-        self.assertIn("--set field.background.ext=0.05 --seed", failure["command"])
+        # All of the run, in the folder of the tables.
+        self.assertRegex(failure["command"], r"^nephos run scene\.toml --statistics-only --set field\.background\.ext=0\.05 "
+                                             r"--seed \d+ --set time\.steps=30000 --out run-[0-9a-f]{8}$")
         self.assertIn("1 failed", self.call(*arguments, "--status").stdout)
         self.call(*arguments, status=1)  # it is not tried again unasked
         self.call(*arguments, "--retry-failed")
@@ -357,9 +428,12 @@ direction_deg = 90
                                 (["--axis", "seed=1,2"], "replicates"),
                                 (["--axis", "time.steps=10,20"], "range of steps"),
                                 (["--axis", "field.background.ext"], "KEY=V,V"),
-                                (["--axis", "field.background.ext=0.3..0.1:4"], "empty range"),
+                                (["--axis", "field.background.ext=0.3..0.1:4"], "from 0.3 to 0.1, which is not FROM below TO"),
                                 (["--axis", "field.background.act=log:0..1:4"], "log scale"),
-                                (["--axis", "field.background.ext=0.1..0.2"], "has no values"),
+                                (["--axis", "field.background.ext=0.1..0.2"],
+                                 "expected field.background.ext=FROM..TO:COUNT, or --points N"),
+                                (["--axis", "field.background.ext=0.1,0.2", "--points", "5"],
+                                 "--points 5: takes points from ranges, and the axis field.background.ext has values"),
                                 (["--until", "cover.se=nought"], "nought"),
                                 (["--until", "cower.se=0.1"], "did you mean `cover`"),
                                 (["--shard", "3/3"], "'3'"),
@@ -369,6 +443,12 @@ direction_deg = 90
             with self.subTest(arguments=arguments):
                 self.assertIn(says, self.call("sweep", self.null, *arguments, "--out", "bad", status=2).stderr)
         self.assertFalse((self.folder / "bad").exists())
+        for arguments, says in ((["merge", "nothere"], "nothere: is no folder of a sweep: it has no sweep.toml"),
+                                (["report", self.folder], "is no folder of a sweep"),
+                                (["report", "null.toml"], "null.toml: is no folder of a sweep")):
+            self.refused(3, *arguments, says=says)
+        self.sweep("good", steps="20")
+        self.refused(3, "merge", "good", "nothere", says="nothere: is no folder")
         plan = self.write("plan.toml", 'scene = "null.toml"\nreplicats = 2\n[[axis]]\nkey = "field.background.ext"\n'
                                        'values = [0.1, [1]]\n[steps]\nmin = 3\n')
         message = self.call("sweep", plan, status=2).stderr
@@ -422,6 +502,12 @@ direction_deg = 90
         run = rows(self.folder / "u/runs.csv")[0]
         self.assertLess(float(run["cover_se"]), 0.001)
         self.assertGreater(int(run["steps"]), 500)
+        # It has two names, and is one statistic: the same runs.
+        self.assertIn("1 of 1 runs done", self.call("sweep", self.null, "--replicates", "1", "--steps", "100..20000", "--until",
+                                                    "cloud_cover.se=0.001", "--out", "u", "--status").stdout)
+        plan = (self.folder / "u/sweep.toml").read_text()
+        self.write("u/named.toml", plan.replace('"cover"', '"cloud_cover"'))
+        self.assertIn("1 of 1 runs done", self.call("sweep", "u/named.toml", "--out", "u", "--status").stdout)
 
     def test_a_run_until_its_error_is_small(self):
         until = ("run", self.null, "--statistics-only", "--until", "cover.se=0.002", "--max-steps", "6000", "--out", "run")
@@ -440,6 +526,12 @@ direction_deg = 90
         self.assertEqual(len(rows(self.folder / "run/statistics.csv")), len(table))
         self.assertIn("not what --until asks for", self.call(*until[:4], "cover.se=1e-6", "--max-steps", "450", "--out", "short",
                                                              status=1).stderr)
+        # The name of the column will do, too; fewer steps than the scene has will not.
+        self.assertIn("cover: steady; mean", self.call(*until[:4], "cloud_cover.se=0.01", "--out", "named").stderr)
+        self.refused(2, *until[:4], "cover.se=0.1", "--max-steps", "399", "--out", "no", says="takes `time.steps` = 400 at least")
+        said = self.call(*until[:4], "cover.se=0.1", "--set", "time.steps=30", "--max-steps", "40", "--out", "short", "--overwrite",
+                         status=1).stderr
+        self.assertIn("cover: not_steady, so it has no mean after 40 steps: not what --until asks for", said)
         self.refused(2, *until[:4], "clouds_per_km2.se=1", "--out", "no", says="not measured at every step")
 
     def test_series_are_readable(self):
@@ -458,6 +550,19 @@ direction_deg = 90
                 levels = file.variables["cloud_area_fraction_in_atmosphere_layer"][number]
                 self.assertAlmostEqual(float(levels.mean()), float(run["cloud_fraction"]), places=6)
             self.assertTrue(math.isclose(float(file.variables["time"][1]), 10))
+            # CF: what is over runs names its auxiliary coordinates, and they are there.
+            seeds = [text.tobytes().decode().strip() for text in file.variables["seed"][:]]
+            self.assertEqual(seeds, [run["seed"] for run in rows(self.folder / "a/runs.csv")])
+            runs = ["run_id", "realization", "point", "seed", "field_background_ext"]
+            for name, others in (("cloud_area_fraction", ["time"]), ("cloud_area_fraction_in_atmosphere_layer", ["height"]),
+                                 ("clouds_of_size", ["size_bin_begin"]), ("warm_up_steps", [])):
+                self.assertEqual(file.variables[name].coordinates.decode().split(), runs + others, name)
+            for name, variable in file.variables.items():
+                has = hasattr(variable, "coordinates")
+                self.assertEqual(has, variable.dimensions[0] == "run" and name not in runs, name)
+        keys = json.loads((self.folder / "a/manifest.json").read_text())["parameters"]
+        self.assertEqual((keys["field.background.act"], keys["lattice.cells"], keys["field.background.hum"]), ("0.002", "[64, 64, 10]", "0.0"))
+        self.assertIn("density.refine", keys)
 
     def test_the_files_of_the_page_work(self):
         page = SOURCE / "docs/research"

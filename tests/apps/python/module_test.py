@@ -298,6 +298,16 @@ class Studies(Case):
         with self.assertRaisesRegex(nephos.Error, "tracks=True"):
             plain.tracks()
 
+    def test_merged_parts_have_a_report(self):
+        scene = nephos.Scene.from_text(NULL_SCENE)
+        for part in range(2):
+            nephos.sweep(scene, {"field.background.ext": [0.05, 0.1]}, self.folder / f"part{part}", replicates=2, steps=(50, 50),
+                         workers=1, shard=(part, 2))
+        merged = nephos.merge([self.folder / "part0", self.folder / "part1"], self.folder / "merged")
+        page = merged.report()
+        self.assertEqual(page, self.folder / "merged/report.html")
+        self.assertIn("4 done, 0 failed, 0 missing", page.read_text())
+
     def test_a_fit_has_the_numbers_of_the_command(self):
         self.write("null.toml", NULL_SCENE)
         path = self.write("fit.toml", """\
