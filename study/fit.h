@@ -32,7 +32,7 @@ struct FitParameter {
 struct FitTarget {
     std::string statistic;  // of kStatistics
     double value = 0, sd = 0;
-    std::string from = {};  // the cloud mask that the value is of; empty of a number
+    std::string from = {};  // the cloud mask that the value is of, the first of several; empty of a number
     // Values of that mask that are missing, and were taken as clear.
     std::uint64_t missing = 0;
 };

@@ -31,6 +31,7 @@ struct Measured {
     std::string scene;  // as the file names it
     Extent extent;
     double cell_size_m = 0;
+    double floor_m = 0;   // lower face of the lowest level
     bool varies = false;  // a parameter changes its cells
 };
 
@@ -47,7 +48,7 @@ std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem:
     try {
         const SweepPlan plan(base);
         const AutomatonOptions lattice = automaton_options(plan.scene(), plan.measured_lattice());
-        return Measured{*scene, lattice.extent, lattice.placement.cell_size_m};
+        return Measured{*scene, lattice.extent, lattice.placement.cell_size_m, lattice.placement.origin_m.z};
     } catch (const SceneErrors& errors) {
         for (const Problem& problem : errors.problems()) {
             if (problem.where.line > 0)
@@ -156,6 +157,12 @@ std::string size_text(int x, int y, const std::optional<int>& z, double cell_m, 
 bool compare_sizes(TomlTable& target, const FitTarget& to, const CloudMasks& masks, const Measured& measured,
                    std::vector<std::string>& notes) {
     if (measured.varies) return true;
+    if ((to.statistic == "base_mean_m" || to.statistic == "top_mean_m") && masks.base_m != measured.floor_m)
+        notes.push_back(
+            fmt::format("the lowest level of {} begins at {} m, that of {} at {} m: `{}` is compared "
+                        "all the same",
+                        to.from, number_text(masks.base_m, 6), measured.scene,
+                        number_text(measured.floor_m, 6), to.statistic));
     const Extent box = masks.snapshots.front().extent(), own = measured.extent;
     const auto differ = [](double a, double b) { return std::abs(a - b) > 1e-3 * b; };
     const bool other_cells = differ(masks.cell_size_m, measured.cell_size_m),
@@ -213,17 +220,21 @@ MaskOptions read_mask_options(TomlTable& target) {
 void read_target_mask(TomlTable& target, const std::filesystem::path& folder,
                       const std::optional<Measured>& measured, FitTarget& to,
                       std::vector<std::string>& notes) {
-    to.from = target.text("from").value_or("");
+    const std::vector<std::string> files = target.texts("from");
+    std::vector<std::filesystem::path> paths;
+    for (const std::string& file : files) paths.push_back(folder / file);
+    if (!files.empty())
+        to.from = files.front() + (files.size() > 1 ? fmt::format(" and {} more", files.size() - 1) : "");
     const MaskOptions mask = read_mask_options(target);
     const std::optional<double> sd = target.number("sd", kSmallest, kLargest);
     if (target.has("value"))
         target.report("value", "a target has both value and from", "expected one of them");
     const bool clear_if_missing = target.word("missing", {"clear"}).has_value();
-    if (to.from.empty())
+    if (files.empty())
         return target.report("from", "names no file", "expected a cloud mask: .vdb, .nc or .png");
     SeriesMean mean{};
     try {
-        const CloudMasks masks = read_masks({folder / to.from}, mask);
+        const CloudMasks masks = read_masks(paths, mask);
         to.missing = masks.missing;
         const std::size_t values = masks.snapshots.size() * masks.snapshots.front().extent().cells();
         if (masks.missing > 0 && !clear_if_missing)

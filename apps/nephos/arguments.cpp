@@ -4,14 +4,15 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
-#include "scenes/format/warnings.h"
 #include "scenes/format/reader.h"
+#include "scenes/format/warnings.h"
 
 namespace nephos {
 namespace {
@@ -72,7 +73,10 @@ std::uint64_t parse_unsigned(const std::string& text, std::uint64_t min, std::ui
 double parse_real(const std::string& text, double min, double max) {
     double number = 0;
     if (!convert(text, number) || !std::isfinite(number) || number < min || number > max) {
-        refuse(text, fmt::format("a number from {:g} to {:g}", min, max));
+        constexpr double kLargest = std::numeric_limits<double>::max();
+        refuse(text, max < kLargest    ? fmt::format("a number from {:g} to {:g}", min, max)
+                     : min > -kLargest ? fmt::format("a number from {:g} upwards", min)
+                                       : "a number");
     }
     return number;
 }

@@ -309,7 +309,7 @@ class Stats(Case):
     def test_what_is_missing_or_wrong_is_said(self):
         name = self.netcdf("a.nc", numpy.zeros((4, 5)), ("y", "x"))
         self.refused(2, "stats", name, says="give --cell-size METRES")
-        self.refused(2, "stats", name, "--cell-size", "0", says="--cell-size")
+        self.refused(2, "stats", name, "--cell-size", "0", says="--cell-size '0' is not a number from 1e-06 upwards")
         self.refused(2, "stats", name, "--cell-size", "5", "--periodic", "z", says="'z' is not one of x, y and xy")
         self.refused(2, "stats", self.scene, says="expected .vdb, .nc or .png")
         self.refused(3, "stats", "none.png", "--cell-size", "5", says="none.png")
@@ -356,6 +356,48 @@ class Stats(Case):
         notes = json.loads((self.folder / "clear/fit.json").read_text())["notes"]
         self.assertIn("swath.nc has 8 x 4 cells of 50 m, null.toml has 128 x 64 x 20 cells of 50 m", notes[0])
         self.assertIn("swath.nc: 16 of 32 values are missing, and count as clear", notes[1])
+
+    def test_several_files_are_a_target_with_its_own_error(self):
+        """Two targets of other kinds for two parameters; levels of NetCDF begin at 0 m, those of the scene higher."""
+        self.write("null.toml", NULL.replace("[time]", "origin_m = [0, 0, 600]\n[time]"))
+        for n in range(3):
+            self.call("state", "null.toml", "--steps", 300 + 60 * n, "--set", "field.background.ext=0.08",
+                      "--set", "field.background.act=0.0012", "--out", f"{n}.vdb")
+        found = self.stats("0.vdb", "1.vdb", "2.vdb", "--variable", "cld")["statistics"]
+        levels = self.netcdf("levels.nc", random_mask(13, (20, 64, 128), 0.012) * 1.0, ("z", "y", "x"))
+        fit = FIT[:FIT.index("[[target]]")].replace("runs = 32", "runs = 24")
+        self.write("two.toml", fit + """\
+[[parameter]]
+key = "field.background.act"
+prior = { from = 0.0005, to = 0.002, scale = "log" }
+[[target]]
+statistic = "lifetime_s"
+value = 120
+sd = 3
+[[target]]
+statistic = "cover"
+from = ["0.vdb", "1.vdb", "2.vdb"]
+variable = "cld"
+""")
+        self.call("fit", "two.toml", "--out", "two", "-j", "2")
+        result = json.loads((self.folder / "two/fit.json").read_text())
+        lifetime, cover = result["targets"]
+        self.assertEqual((lifetime["from"], cover["from"], result["notes"]), (None, "0.vdb and 2 more", []))
+        self.assertEqual((cover["target"], cover["sd"]), (found["cover"]["mean"], found["cover"]["se"]))
+        self.assertEqual([direction["strength"] > 1 for direction in result["directions"]], [True, True])
+        # Cells live for 1 / ext steps of 10 s.
+        self.assertAlmostEqual(result["parameters"][0]["mean"], 10 / 120, delta=4 * 10 / 120 * 3 / 120)
+        self.write("base.toml", fit.replace("runs = 24", "runs = 10").replace("proof = 4", "proof = 0") + """\
+[[target]]
+statistic = "base_mean_m"
+from = "levels.nc"
+cell_size_m = 50
+sd = 20
+""")
+        said = self.call("fit", "base.toml", "--out", "base", "-j", "2").stderr
+        self.assertIn("note: the lowest level of levels.nc begins at 0 m, that of null.toml at 600 m: `base_mean_m`", said)
+        self.refused_fit("from = []\nsd = 0.1", "names no file")
+        self.refused_fit("from = [\"0.vdb\", 3]\nsd = 0.1", "`target[0].from` holds an integer")
 
     def test_what_a_view_from_above_lacks_is_no_target(self):
         self.write("null.toml", NULL)
