@@ -98,6 +98,7 @@ class Fitter {
                         fmt::format("{} runs are too few for {} parameters: expected {} or more",
                                     problem.runs, dimensions_, fewest_runs(dimensions_)));
         for (const FitTarget& target : problem.targets) {
+            without_.push_back(0);
             transforms_.push_back(transform_of(target.statistic));
             z_.push_back(forward(transforms_.back(), target.value));
             sd_.push_back(slope(transforms_.back(), target.value) * target.sd);
@@ -148,6 +149,7 @@ class Fitter {
             for (std::size_t n = 0; n < z_.size(); ++n) {
                 run.errors[n] *= slope(transforms_[n], run.statistics[n]);
                 run.statistics[n] = forward(transforms_[n], run.statistics[n]);
+                without_[n] += !std::isfinite(run.statistics[n]);
                 whole = whole && std::isfinite(run.statistics[n]);
             }
             if (whole) {
@@ -156,14 +158,22 @@ class Fitter {
                 ++lost_;
             }
         }
-        if (lost_ > runs_.size())
-            throw Error(
-                ErrorCode::usage,
-                fmt::format(
-                    "{} of {} runs have no mean of every target (not steady, dead or failed): give more "
-                    "steps, or a prior without the regimes that jump",
-                    lost_, lost_ + runs_.size()));
+        if (lost_ > runs_.size()) throw_lost();
         emulate();
+    }
+
+    [[noreturn]] void throw_lost() const {
+        std::string targets;
+        for (std::size_t n = 0; n < without_.size(); ++n)
+            if (without_[n] > 0)
+                targets += fmt::format("{}`{}` in {}", targets.empty() ? "" : ", ",
+                                       problem_.targets[n].statistic, without_[n]);
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{} of {} runs have no mean of every target, or none that can be a target's (not "
+                        "steady, dead, overcast or failed): {}; give more steps, a prior without the "
+                        "regimes that jump, or another target",
+                        lost_, lost_ + runs_.size(), targets));
     }
 
     void emulate() {
@@ -466,6 +476,7 @@ class Fitter {
     std::set<Point> tried_;       // of all runs, those that were lost included
     std::uint64_t taken_ = 0;     // points of the Sobol sequence
     std::uint64_t lost_ = 0;
+    std::vector<std::uint64_t> without_;  // runs that have none of each target
     std::vector<Emulator> emulators_;
 };
 

@@ -66,6 +66,13 @@ class Fit(Case):
         self.assertEqual(self.call("fit", file, "--out", "fit", "-j", "1").stdout, result.stdout)
         self.assertEqual((self.folder / "fit/wave-1/timing.csv").read_text(), before)
 
+    def test_the_target_that_no_run_has_is_named(self):
+        """Nothing pulses without vapour."""
+        self.write("null.toml", NULL)
+        fit = FIT.replace("runs = 32", "runs = 12") + "[[target]]\nstatistic = \"pulse_period_s\"\nvalue = 100\nsd = 5\n"
+        said = self.refused(2, "fit", self.write("fit.toml", fit), "--out", "fit", "-j", "2", says="6 of 6 runs have no mean").stderr
+        self.assertIn("`pulse_period_s` in 6;", said)
+
     def test_a_fit_of_another_version_is_overwritten(self):
         """Its records are refused with a cure that helps."""
         self.write("null.toml", NULL)
