@@ -200,6 +200,9 @@ class Disk(Case):
         parts = [p for p in self.folder.rglob("*") if ".part" in p.name]
         self.assertEqual(parts, [])
 
+    def size(self, name):
+        return (self.folder / name).stat().st_size
+
     def refused_at(self, size, says, *arguments):
         result = self.refused(3, *arguments, says=says, preexec_fn=self.limited(size))
         self.assertIn("File too large", result.stderr)
@@ -211,8 +214,14 @@ class Disk(Case):
 
     def test_vdb(self):
         # Larger than manifest and table, smaller than a grid.
-        self.refused_at(5000, "tiny_0001.vdb", "run", self.scene, "--no-render", "--out", "out")
-        self.call("run", self.scene, "--no-render", "--out", "out")
+        more = ["--set", "lattice.cells=[96, 64, 24]", "--no-render", "--out"]
+        self.call("run", self.scene, *more, "whole")
+        small = max(self.size("whole/manifest.json"), self.size("whole/statistics.csv"))
+        limit = small + 1000
+        self.assertGreater(self.size("whole/density/tiny_0001.vdb"), 2 * limit)
+        self.refused_at(limit, "tiny_0001.vdb", "run", self.scene, *more, "out")
+        self.call("run", self.scene, *more, "out")
+        self.same_runs("whole", "out")
         self.refused_at(5000, "x.vdb", "state", self.scene, "--out", "x.vdb")
 
     def test_frames_that_were_finished_stay(self):
