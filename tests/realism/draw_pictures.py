@@ -39,6 +39,7 @@ PICTURES = {
     "climate.jpg": (3, (400, 300), [("climate", frame, {}) for frame in (1, 12, 22, 32, 42, 55)]),
     "genera.jpg": (4, (320, 240), [(f"genera/{genus}", 1, {}) for genus in GENERA]),
     "sunset.jpg": (1, (960, 540), [("sunset", 20, {})]),
+    "mammatus.jpg": (1, (960, 600), [("mammatus", 1, {})]),
     "shafts.jpg": (1, (640, 480), [("shafts", 20, {})]),
     "sea.jpg": (1, (960, 540), [("sea", 1, {})]),
     "mountains.jpg": (1, (960, 540), [("mountains", 1, {})]),

@@ -75,6 +75,19 @@ TEST(Atmosphere, SunlightEqualsIntegration) {
     }
 }
 
+// From 5.5 km the horizon lies 2.4 degrees down: there the sun shines on clouds from below when it has set for the ground, and
+// redder the lower it is.
+TEST(Atmosphere, HighCloudsAreInTheSunAfterItHasSet) {
+    double redness = 1;
+    for (const double elevation : {0.0, -1.2, -2.0}) {
+        const Rgb sun = earth().sunlight(5500, elevation);
+        EXPECT_GT(sun[0], 0.05) << elevation;
+        EXPECT_GT(sun[0] / sun[2], 1.5 * redness) << elevation;
+        redness = sun[0] / sun[2];
+    }
+    for (const double after : {earth().sunlight(0, -1.2)[0], earth().sunlight(5500, -3.0)[0]}) EXPECT_EQ(after, 0);
+}
+
 TEST(Atmosphere, MultipleScatteringEqualsQuadrature) {
     std::mt19937 engine(2);
     const auto uniform = [&] { return engine() / 4294967296.0; };
