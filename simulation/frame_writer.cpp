@@ -19,7 +19,7 @@
 namespace nephos {
 
 FrameWriter::FrameWriter(const Scene& scene, RunFolder folder, int first_frame)
-    : scene_(with_files(scene)), folder_(std::move(folder)), scene_hash_(scene_hash(scene)), first_frame_(first_frame) {}
+    : scene_(with_files(scene)), folder_(std::move(folder)), frames_hash_(frames_hash(scene)), first_frame_(first_frame) {}
 
 // With the exposure that the frame has; `camera`: at its time.
 RenderOptions FrameWriter::exposed_options(const FrameResult& frame, const Picture& picture,
@@ -41,7 +41,7 @@ RenderOptions FrameWriter::exposed_options(const FrameResult& frame, const Pictu
     return options;
 }
 
-VdbMetadata density_metadata(const Scene& scene, std::string scene_hash, double time_s,
+VdbMetadata density_metadata(const Scene& scene, std::string frames_hash, double time_s,
                              const StateHash& hash) {
     VdbMetadata metadata;
     metadata.extinction_per_m = scene.density.extinction_per_m;
@@ -50,7 +50,7 @@ VdbMetadata density_metadata(const Scene& scene, std::string scene_hash, double 
     metadata.frames_per_second = scene.frames.per_second;
     metadata.time_scale = scene.frames.time_scale;
     metadata.seed = scene.automaton.seed;
-    metadata.scene_hash = std::move(scene_hash);
+    metadata.scene_hash = std::move(frames_hash);
     metadata.state_hash = hash.hex();
     metadata.nephos_version = version();
     metadata.random_stream_version = int(kRandomStreamVersion);
@@ -75,7 +75,7 @@ DensityGrid FrameWriter::refined(const DensityGrid& density, const std::optional
 
 VdbMetadata FrameWriter::metadata_of(const FrameResult& frame, const StateHash& hash,
                                      std::optional<std::size_t> layer, const DensityGrid& density) const {
-    VdbMetadata metadata = density_metadata(scene_, scene_hash_, frame.time_s, hash);
+    VdbMetadata metadata = density_metadata(scene_, frames_hash_, frame.time_s, hash);
     metadata.period_m = period_m(scene_, layer);
     metadata.wind = wind_levels(scene_, layer, density.placement(), density.extent(), frame.time_s);
     return metadata;
@@ -147,7 +147,7 @@ Rgb8Image FrameWriter::write_picture(const FrameResult& frame, const Picture& pi
     PictureMetadata metadata;
     metadata.scene = scene_.name;
     metadata.seed = scene_.automaton.seed;
-    metadata.scene_hash = scene_hash_;
+    metadata.scene_hash = frames_hash_;
     metadata.state_hash = frame.hash.hex();
     metadata.version = version();
     painter.note_renderer(metadata);

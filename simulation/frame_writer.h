@@ -53,14 +53,15 @@ class FrameWriter {
     RunFolder folder_;
     RenderOptions exposed_options(const FrameResult& frame, const Picture& picture, const Camera& camera);
 
-    std::string scene_hash_;
+    std::string frames_hash_;
     int first_frame_ = 1;
     int exposed_frame_ = 0;   // the last whose exposure is known; 0: none
     double exposed_ev_ = 0;  // of that frame, stops
 };
 
-// Returns the metadata of a density file of a scene, of the moment `time_s` whose state has this hash.
-VdbMetadata density_metadata(const Scene& scene, std::string scene_hash, double time_s,
+// Returns the metadata of a density file of a scene with this frames_hash(), of the moment `time_s` whose state has this
+// hash.
+VdbMetadata density_metadata(const Scene& scene, std::string frames_hash, double time_s,
                              const StateHash& hash);
 
 }  // namespace nephos

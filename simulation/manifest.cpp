@@ -192,6 +192,7 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
     json["scene"] = {{"name", scene.name},
                      {"file", settings.scene_file},
                      {"hash", settings.scene_hash},
+                     {"frames_hash", frames_hash(scene)},
                      {"simulation_hash", settings.simulation_hash},
                      {"seed", std::to_string(scene.automaton.seed)},
                      {"steps", scene.steps}};
@@ -329,6 +330,7 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
         run.complete = json.at("complete").get<bool>();
         run.name = json.at("scene").at("name").get<std::string>();
         run.scene_hash = json.at("scene").at("hash").get<std::string>();
+        run.frames_hash = json.at("scene").value("frames_hash", run.scene_hash);  // not in those of earlier versions
         run.simulation_hash = json.at("scene").at("simulation_hash").get<std::string>();
         run.render = json.at("range").at("pictures").get<bool>();
         run.range.last_step = json.at("range").at("last_step").get<std::uint64_t>();

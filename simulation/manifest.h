@@ -81,7 +81,7 @@ std::map<int, std::vector<FileRecord>> read_frame_files(const std::filesystem::p
 // What a later run must know about an earlier one.
 struct EarlierRun {
     bool complete = false;
-    std::string name, scene_hash, simulation_hash;
+    std::string name, scene_hash, frames_hash, simulation_hash;
     std::uint64_t scene_steps = 0;  // `time.steps` of its scene
     bool render = true;
     SimulationRange range;

@@ -37,6 +37,7 @@ RunListing read_run(const std::filesystem::path& folder) {
     RunListing run;
     run.folder = folder;
     run.scene_hash = earlier.scene_hash;
+    run.frames_hash = earlier.frames_hash;
     run.simulation_hash = earlier.simulation_hash;
     run.complete = earlier.complete;
     run.render = earlier.render;

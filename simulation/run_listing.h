@@ -25,7 +25,7 @@ struct ListedFrame {
 struct RunListing {
     std::filesystem::path folder;
     Scene scene;
-    std::string scene_hash, simulation_hash, nephos_version;
+    std::string scene_hash, frames_hash, simulation_hash, nephos_version;
     bool complete = false;
     bool render = false;
     SimulationRange range;

@@ -113,7 +113,7 @@ class Decoder {
                 fmt::format("{}: time {} s, {} in the manifest", file.path, m.time_s, frame.time_s));
         if (m.extinction_per_m != run_.scene.density.extinction_per_m)
             metadata_.add(fmt::format("{}: extinction {} per m", file.path, m.extinction_per_m));
-        if (m.scene_hash != run_.scene_hash) metadata_.add(file.path + ": is of another scene");
+        if (m.scene_hash != run_.frames_hash) metadata_.add(file.path + ": is of another scene");
         if (run_.scene.layers.empty() && m.state_hash != frame.state_hash)
             metadata_.add(file.path + ": is of another state");
         if (!(m.georeference == run_.scene.georeference))

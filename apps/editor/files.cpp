@@ -122,7 +122,7 @@ void start_export(Editor& editor, const fs::path& path) {
             VdbContent content;
             content.density = &result.density;
             write_vdb(state.path, content,
-                      density_metadata(scene, scene_hash(scene), result.time_s, result.hash));
+                      density_metadata(scene, frames_hash(scene), result.time_s, result.hash));
         } catch (const std::exception& error) {
             state.failure = error.what();
         }

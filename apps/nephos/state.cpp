@@ -67,7 +67,7 @@ int state(const StateArguments& a) {
     content.cld = automaton.cld();
     content.cells = automaton.options().placement;
     const VdbMetadata metadata =
-        density_metadata(scene, scene_hash(scene), automaton.time_s(), automaton.hash());
+        density_metadata(scene, frames_hash(scene), automaton.time_s(), automaton.hash());
     write_vdb(a.out, content, metadata);
 
     const CloudStatistics statistics =

@@ -30,7 +30,7 @@
 //     nephos_frames_per_second          double   frames per second of film
 //     nephos_time_scale                 double   simulated seconds per second of film
 //     nephos_seed                       string   decimal, 0..2^64-1
-//     nephos_scene_hash                 string   hash of the scene
+//     nephos_scene_hash                 string   hash of the scene but for its number of steps
 //     nephos_state_hash                 string   hash of the automaton's state at or before this frame
 //     nephos_version                    string   version of nephos that wrote the file
 //     nephos_random_stream_version      int32    version of the random stream

@@ -234,6 +234,12 @@ std::string scene_hash(const Scene& scene) {
     return hash_of(to_toml(named));
 }
 
+std::string frames_hash(const Scene& scene) {
+    Scene endless = scene;
+    endless.steps = 0;
+    return scene_hash(endless);
+}
+
 std::string simulation_hash(const Scene& scene, std::string_view initial_state_hash) {
     Scene simulation;
     simulation.automaton = scene.automaton;

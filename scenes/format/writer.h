@@ -22,6 +22,10 @@ std::string to_toml(const Scene& scene);
 // Returns the XXH3-128 of to_toml(scene), as 32 lower-case hexadecimal digits.
 std::string scene_hash(const Scene& scene);
 
+// Returns the scene_hash() of the scene without its number of steps: files of frames carry it, so that those of a run that
+// was resumed into more steps are the same as those of a run that had them from the start.
+std::string frames_hash(const Scene& scene);
+
 // Returns the hash of the options that determine the bits and the densities: automaton and density, not the
 // number of steps, the frames or the rendering, so that a resumed, extended or differently rendered run has
 // the same hash. Of initial_state_file only its presence counts, because the folder may move; pass the hash

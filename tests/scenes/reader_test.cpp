@@ -424,6 +424,8 @@ TEST(Hashes, CoverWhatTheySay) {
     const Scene longer = with([](Scene& s) { s.steps += 100; });
     EXPECT_NE(scene_hash(scene), scene_hash(longer));
     EXPECT_EQ(simulation_hash(scene), simulation_hash(longer));
+    EXPECT_EQ(frames_hash(scene), frames_hash(longer));
+    EXPECT_NE(frames_hash(scene), frames_hash(with([](Scene& s) { s.render.sun.elevation_deg = 3; })));
     EXPECT_EQ(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.name = "x"; })));
     EXPECT_EQ(simulation_hash(scene),
               simulation_hash(with([](Scene& s) { s.render.sun.elevation_deg = 3; })));

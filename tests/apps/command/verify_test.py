@@ -129,6 +129,19 @@ class Verify(Case):
         self.assertEqual(self.failed("a", "--against", "c"), ["against"])
         self.assertEqual(self.failed("a", "--max-change", 0), ["motion"])
 
+    def test_a_run_that_was_resumed_into_more_steps(self):
+        """Its files are, byte for byte, those of a run that had the steps from the start."""
+        self.call("run", self.scene, "--out", "whole", "--set", "frames.exr=true")
+        self.call("run", self.scene, "--out", "out", "--set", "frames.exr=true", "--set", "time.steps=3")
+        self.call("run", self.scene, "--out", "out", "--set", "frames.exr=true", "--resume")
+        self.checks("out")
+        self.checks("out", "--against", "whole")
+        names = [file["path"] for frame in json.loads((self.folder / "whole/manifest.json").read_text())["frames"]
+                 for file in frame["files"]]
+        self.assertGreater(len(names), 9)
+        for name in names:
+            self.assertEqual((self.folder / "whole" / name).read_bytes(), (self.folder / "out" / name).read_bytes(), name)
+
     def test_folders_that_are_no_runs(self):
         self.refused(3, "verify", ".", says="manifest.json")
         self.write("bad/manifest.json", "{}")
