@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 
 #include "automaton/air_parcels.h"
+#include "automaton/grid_values.h"
 #include "core/error.h"
 #include "core/text.h"
 
@@ -171,11 +172,7 @@ void check_grids(const std::vector<ProbabilityGrid>& grids) {
         const std::string name = "field.grids[" + std::to_string(n) + "]";
         for (std::size_t m = 0; m < n; ++m)
             require(grids[m].of != grids[n].of, name + ".of: there is a grid of this probability already");
-        if (!grids[n].samples) continue;
-        for (const float value : grids[n].samples->values)
-            require(value >= 0 && value <= 1,
-                    name + ": " + (grids[n].file ? grids[n].file->string() : std::string("its grid")) + " has the value " +
-                        number(value) + ": expected probabilities 0..1");
+        check(grids[n]);
     }
 }
 
@@ -191,6 +188,13 @@ double images_of(const Vec3& reach_m, const AutomatonOptions& o) {
 }
 
 }  // namespace
+
+void check(const ProbabilityGrid& grid) {
+    if (!grid.samples) return;
+    for (const float value : grid.samples->values)
+        require(value >= 0 && value <= 1, (grid.file ? grid.file->string() : std::string("the grid")) +
+                                              ": has the value " + number(value) + ": expected probabilities 0..1");
+}
 
 Vec3 largest_reach_m(const Extent& extent, double cell_size_m, const Boundaries& boundaries) {
     const auto along = [&](Boundary boundary, int cells) {

@@ -5,12 +5,11 @@
 
 #include <map>
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "render/cloud/splats.h"
-#include "seeds/model.h"
+#include "scenes/format/scene.h"
 
 namespace nephos {
 
@@ -23,11 +22,16 @@ struct ModelTextures {
     std::int32_t picture_of(const BaseModel& model, std::uint32_t word) const;
 };
 
-// Returns the names of all these files, each once, in their order.
-std::vector<std::string> texture_files(std::span<const BaseModel> models);
+struct TextureFile {
+    std::string file;
+    std::string key;  // the first that names it: "model[0].textures[1]"
+};
 
-// Returns null when no model has any. Throws Error(io) naming a file that is no PNG with transparency
-// (render/image/alpha_image.h), Error(usage) for more than kMostBillboardPictures.
-std::shared_ptr<const ModelTextures> read_textures(std::span<const BaseModel> models);
+// Returns all these files, each once, in their order. Throws Error(usage) for more than kMostBillboardPictures.
+std::vector<TextureFile> texture_files(const Scene& scene);
+
+// Returns null when no model has any. Throws Error(io) with the key's place (simulation/scene_files.h) for a file that is no
+// PNG with transparency (render/image/alpha_image.h), and as texture_files().
+std::shared_ptr<const ModelTextures> read_textures(const Scene& scene);
 
 }  // namespace nephos

@@ -13,10 +13,10 @@
 
 #include "core/wind.h"
 #include "density/veil.h"
-#include "render/terrain/terrain.h"
 #include "scenes/format/layers.h"
 #include "simulation/frame_detail.h"
 #include "simulation/memory.h"
+#include "simulation/scene_files.h"
 
 namespace nephos {
 namespace {
@@ -81,8 +81,8 @@ std::shared_ptr<const CloudBases> cloud_of(const Scene& scene, std::size_t n, co
 
 FramePainter::FramePainter(const Scene& scene, const DeviceOptions& device)
     : scene_(scene), renderer_(device), ground_(ground_of(scene)), textures_(textures_of(scene)) {
-    painter_.use_textures(read_textures(scene.models));
-    painter_.use_terrain(make_terrain(scene.render.terrain, scene.render.ground));
+    painter_.use_textures(read_textures(scene));
+    painter_.use_terrain(read_terrain(scene));
 }
 
 FramePainter::FileState FramePainter::state_of(const std::filesystem::path& file) {
@@ -106,7 +106,7 @@ FramePainter::Ground FramePainter::ground_of(const Scene& scene) {
 
 std::vector<FramePainter::FileState> FramePainter::textures_of(const Scene& scene) {
     std::vector<FileState> states;
-    for (const std::string& file : texture_files(scene.models)) states.push_back(state_of(file));
+    for (const TextureFile& texture : texture_files(scene)) states.push_back(state_of(texture.file));
     return states;
 }
 
@@ -118,9 +118,9 @@ void FramePainter::set_scene(const Scene& scene, bool same_layers) {
         scene_ = scene;
         return;
     }
-    std::shared_ptr<const ModelTextures> textures = read_textures(scene.models);
+    std::shared_ptr<const ModelTextures> textures = read_textures(scene);
     std::shared_ptr<const HeightMap> terrain =
-        same_terrain ? painter_.terrain() : make_terrain(scene.render.terrain, scene.render.ground);
+        same_terrain ? painter_.terrain() : read_terrain(scene);
     scene_ = scene;
     if (!same_layers) painter_ = SkyPainter();
     painter_.use_textures(std::move(textures));

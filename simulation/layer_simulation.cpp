@@ -10,6 +10,7 @@
 #include "core/bytes.h"
 #include "core/error.h"
 #include "density/vdb/vdb_file.h"
+#include "scenes/format/text.h"
 #include "scenes/format/writer.h"
 #include "seeds/coupling.h"
 #include "simulation/memory.h"
@@ -197,7 +198,8 @@ void LayerSimulation::restore(std::span<const std::byte> bytes) {
 std::optional<Lattice> initial_state_of_layer(const Scene& scene, std::size_t layer) {
     const LayerOptions& options = scene.layers[layer];
     if (!options.initial_state_file) return {};
-    return read_state(*options.initial_state_file, options.extent, options.placement);
+    return read_at_key(scene, indexed("layer", layer) + ".lattice.initial_state",
+                       [&] { return read_state(*options.initial_state_file, options.extent, options.placement); });
 }
 
 std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial,
@@ -215,7 +217,9 @@ std::optional<Lattice> initial_state(const Scene& scene, const std::string& from
     const AutomatonOptions& lattice = scene.automaton;
     if (!from.empty()) return read_state(from, lattice.extent, lattice.placement);
     if (scene.initial_state_file) {
-        return read_state(*scene.initial_state_file, lattice.extent, lattice.placement);
+        return read_at_key(scene, "lattice.initial_state", [&] {
+            return read_state(*scene.initial_state_file, lattice.extent, lattice.placement);
+        });
     }
     return {};
 }

@@ -5,14 +5,47 @@
 #include <span>
 #include <utility>
 
+#include "automaton/grid_values.h"
 #include "core/digest.h"
 #include "density/vdb/vdb_file.h"
+#include "render/image/alpha_image.h"
+#include "scenes/format/errors.h"
+#include "scenes/format/text.h"
+#include "simulation/billboard_files.h"
+#include "simulation/layer_simulation.h"
 #include "simulation/memory.h"
 
 namespace nephos {
 namespace {
 
 constexpr int kVector = 3;
+
+std::string wind_file_key(const Scene& scene, std::size_t field, std::size_t n) {
+    return key_of_file(scene, indexed("wind_field", field) + ".files", n);
+}
+
+std::string grid_file_key(std::size_t n) { return indexed("field.grids", n) + ".file"; }
+
+// Collects the problems of many readers.
+class Collector {
+  public:
+    template <class Read>
+    void add(const Read& read) {
+        try {
+            read();
+        } catch (const SceneErrors& errors) {
+            if (problems_.empty()) code_ = errors.code();
+            problems_.insert(problems_.end(), errors.problems().begin(), errors.problems().end());
+        }
+    }
+    void throw_if_any() {
+        if (!problems_.empty()) throw SceneErrors(std::move(problems_), code_);
+    }
+
+  private:
+    std::vector<Problem> problems_;
+    ErrorCode code_ = ErrorCode::io;
+};
 
 // Reads one file after the other, as long as there is memory for their values.
 class SampleReader {
@@ -39,15 +72,38 @@ void add(Digest& digest, const SampleGrid& grid) {
 
 }  // namespace
 
+std::string key_of_file(const Scene& scene, const std::string& list, std::size_t n) {
+    return scene.file_places.of_key.contains(list) ? list : indexed(list, n);
+}
+
+void throw_at_key(const Scene& scene, const std::string& key, const Error& error) {
+    const auto place = scene.file_places.of_key.find(key);
+    if (dynamic_cast<const SceneErrors*>(&error) != nullptr || place == scene.file_places.of_key.end()) throw;
+    Problem problem = place->second;
+    problem.message = enclosed(key, '`') + ": " + error.what();
+    std::vector<Problem> problems;
+    problems.push_back(std::move(problem));
+    throw SceneErrors(std::move(problems), error.code());
+}
+
 Scene with_files(Scene scene) {
     SampleReader reader;
-    for (WindField& field : scene.automaton.wind.fields) {
+    for (std::size_t f = 0; f < scene.automaton.wind.fields.size(); ++f) {
+        WindField& field = scene.automaton.wind.fields[f];
         for (std::size_t n = field.samples.size(); n < field.files.size(); ++n)
             field.samples.push_back({field.start_s + double(n) * field.interval_s,
-                                     reader.read(field.files[n], field.grid, kVector)});
+                                     read_at_key(scene, wind_file_key(scene, f, n), [&] {
+                                         return reader.read(field.files[n], field.grid, kVector);
+                                     })});
     }
-    for (ProbabilityGrid& grid : scene.automaton.field.grids)
-        if (!grid.samples && grid.file) grid.samples = reader.read(grid.file->string(), grid.grid, 1);
+    for (std::size_t n = 0; n < scene.automaton.field.grids.size(); ++n) {
+        ProbabilityGrid& grid = scene.automaton.field.grids[n];
+        if (grid.samples || !grid.file) continue;
+        read_at_key(scene, grid_file_key(n), [&] {
+            grid.samples = reader.read(grid.file->string(), grid.grid, 1);
+            check(grid);
+        });
+    }
     for (LayerOptions& layer : scene.layers)
         if (!layer.wind.keyframes.empty()) layer.wind.fields = scene.automaton.wind.fields;
     return scene;
@@ -68,6 +124,38 @@ std::string hash_of_files(const Scene& scene) {
         add(digest, *grid.samples);
     }
     return any ? digest.hex() : std::string();
+}
+
+std::shared_ptr<const HeightMap> read_terrain(const Scene& scene) {
+    return read_at_key(scene, "ground.height_map",
+                       [&] { return make_terrain(scene.render.terrain, scene.render.ground); });
+}
+
+void check_files(const Scene& scene) {
+    Collector found;
+    found.add([&] { initial_state(scene); });
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) found.add([&] { initial_state_of_layer(scene, n); });
+    for (std::size_t f = 0; f < scene.automaton.wind.fields.size(); ++f) {
+        const WindField& field = scene.automaton.wind.fields[f];
+        for (std::size_t n = 0; n < field.files.size(); ++n)
+            found.add([&] {
+                read_at_key(scene, wind_file_key(scene, f, n),
+                            [&] { SampleReader().read(field.files[n], field.grid, kVector); });
+            });
+    }
+    for (std::size_t n = 0; n < scene.automaton.field.grids.size(); ++n)
+        found.add([&] {
+            read_at_key(scene, grid_file_key(n), [&] {
+                ProbabilityGrid grid = scene.automaton.field.grids[n];
+                if (!grid.file) return;
+                grid.samples = SampleReader().read(grid.file->string(), grid.grid, 1);
+                check(grid);
+            });
+        });
+    for (const TextureFile& texture : texture_files(scene))
+        found.add([&] { read_at_key(scene, texture.key, [&] { read_alpha_image(texture.file); }); });
+    if (scene.render.terrain.height_map) found.add([&] { read_terrain(scene); });
+    found.throw_if_any();
 }
 
 }  // namespace nephos

@@ -2,6 +2,7 @@
 
 // nephos validate: every problem of a scene in one pass; or the scene with all its defaults spelled out.
 
+#include <algorithm>
 #include <memory>
 
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include "scenes/format/writer.h"
 #include "simulation/layer_simulation.h"
 #include "simulation/memory.h"
+#include "simulation/scene_files.h"
 
 namespace nephos {
 namespace {
@@ -91,6 +93,7 @@ int validate(const ValidateArguments& a) {
         one.file = file;
         try {
             const Scene scene = load_scene(one);
+            check_files(scene);
             print_warnings(scene);
             for (const std::string& note : keys_without_effect(scene)) print_note(file + ": " + note);
             if (a.print) {
@@ -101,7 +104,7 @@ int validate(const ValidateArguments& a) {
                 output.line(summary(file, scene));
             }
         } catch (const SceneErrors& errors) {
-            status = int(errors.code());
+            status = std::max(status, int(errors.code()));
             if (a.work.json) {
                 Json problems = Json::array();
                 for (const Problem& problem : errors.problems()) problems.push_back(problem_json(problem));
@@ -129,7 +132,7 @@ void add_validate_command(CLI::App& app, Action& action) {
     command->add_flag("--print", a->print, "Print the scene with every key and default spelled out");
     add_json(*command, a->work);
     command->footer(
-        "Exit status 0: all scenes are valid; 2: at least one is not; 3: at least one cannot be read.\n"
+        "Exit status 0: all scenes are valid; 2: at least one is not; 3: at least one, or a file that it names, cannot be read.\n"
         "\n"
         "Examples:\n"
         "  nephos validate scenes/*.toml\n"

@@ -253,10 +253,14 @@ int Document::add_origin(std::string label, std::string text, bool is_file) {
 }
 
 void Document::report(const Place& place, std::string message, std::string expected) {
+    problems.push_back(problem_at(place, std::move(message), std::move(expected)));
+}
+
+Problem Document::problem_at(const Place& place, std::string message, std::string expected) const {
     const Origin& from = origin(place.origin);
     const Excerpt excerpt = excerpt_around(line_of(from, place.line), place.column);
     const SourcePosition where{from.label, from.is_file ? place.line : 0, place.column};
-    problems.push_back({where, std::move(message), std::move(expected), excerpt.text, excerpt.caret});
+    return {where, std::move(message), std::move(expected), excerpt.text, excerpt.caret};
 }
 
 std::optional<Node> Document::parse(int index) { return parse_text(index, origin(index).text, {}); }

@@ -80,6 +80,9 @@ class Document {
 
     void report(const Place& place, std::string message, std::string expected = {});
 
+    // Returns the problem that report() adds.
+    Problem problem_at(const Place& place, std::string message, std::string expected = {}) const;
+
     // Parses the text of an origin. Reports a problem and returns nullopt on a syntax error, invalid UTF-8 or
     // nesting that is too deep.
     std::optional<Node> parse(int origin);

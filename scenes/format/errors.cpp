@@ -90,8 +90,8 @@ std::string format(std::span<const Problem> problems) {
     return out + std::to_string(problems.size()) + (problems.size() == 1 ? " error\n" : " errors\n");
 }
 
-SceneErrors::SceneErrors(std::vector<Problem> problems)
-    : Error(ErrorCode::usage, message_of(problems), first_place(problems)), problems_(std::move(problems)) {}
+SceneErrors::SceneErrors(std::vector<Problem> problems, ErrorCode code)
+    : Error(code, message_of(problems), first_place(problems)), problems_(std::move(problems)) {}
 
 std::string_view closest_word(std::string_view word, std::span<const std::string_view> candidates) {
     constexpr std::size_t kLongestWord =

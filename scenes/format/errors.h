@@ -38,10 +38,10 @@ std::string format(std::span<const Problem> problems);
 
 // All errors of a scene, in the order of the file and then of the options; never empty. what() is
 // format(problems()) without the last newline, where() the position of the first; the code is
-// ErrorCode::usage.
+// ErrorCode::usage, or what is given: of a file that the scene names and nobody can read, ErrorCode::io.
 class SceneErrors : public Error {
   public:
-    explicit SceneErrors(std::vector<Problem> problems);
+    explicit SceneErrors(std::vector<Problem> problems, ErrorCode code = ErrorCode::usage);
     const std::vector<Problem>& problems() const noexcept { return problems_; }
 
   private:

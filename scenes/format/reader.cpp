@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "scenes/format/document.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/schema.h"
 #include "scenes/format/text.h"
 
@@ -177,52 +178,6 @@ std::string name_from(const std::filesystem::path& file) {
     }
     name.erase(0, name.find_first_not_of("-."));
     return name.empty() ? "scene" : name;
-}
-
-// Makes the files that the scene names relative to its folder, but for those of options.
-void resolve_files(Scene& scene, const Document& document, const std::filesystem::path& folder) {
-    const auto resolve = [&](const Node& owner, std::optional<std::filesystem::path>& file) {
-        if (!file) return;
-        const Entry* lattice = owner.find("lattice");
-        const Entry* entry = lattice != nullptr ? lattice->value.find("initial_state") : nullptr;
-        const bool from_file = entry == nullptr || document.origin(entry->value.place.origin).is_file;
-        if (from_file) file = (folder / *file).lexically_normal();
-    };
-    resolve(document.root, scene.initial_state_file);
-    const Entry* fields = document.root.find("wind_field");
-    for (std::size_t n = 0; fields != nullptr && n < scene.automaton.wind.fields.size(); ++n) {
-        const Entry* files = fields->value.items[n].find("files");
-        if (files == nullptr || !document.origin(files->value.place.origin).is_file) continue;
-        for (std::string& file : scene.automaton.wind.fields[n].files)
-            file = (folder / file).lexically_normal().string();
-    }
-    const Entry* field = document.root.find("field");
-    const Entry* grids = field != nullptr ? field->value.find("grids") : nullptr;
-    for (std::size_t n = 0; grids != nullptr && n < scene.automaton.field.grids.size(); ++n) {
-        std::optional<std::filesystem::path>& file = scene.automaton.field.grids[n].file;
-        const Entry* entry = grids->value.items[n].find("file");
-        if (entry != nullptr && file && document.origin(entry->value.place.origin).is_file)
-            file = (folder / *file).lexically_normal();
-    }
-    const Entry* ground = document.root.find("ground");
-    const Entry* heights = ground != nullptr ? ground->value.find("height_map") : nullptr;
-    if (std::optional<std::filesystem::path>& file = scene.render.terrain.height_map;
-        heights != nullptr && file && document.origin(heights->value.place.origin).is_file)
-        file = (folder / *file).lexically_normal();
-    // Textures of a base model from another file are relative to that file.
-    const Entry* models = document.root.find("model");
-    for (std::size_t n = 0; models != nullptr && n < scene.models.size(); ++n) {
-        const Entry* textures = models->value.items[n].find("textures");
-        if (textures == nullptr) continue;
-        const Origin& origin = document.origin(textures->value.place.origin);
-        if (!origin.is_file) continue;
-        const bool of_scene = textures->value.place.origin == 0;
-        const std::filesystem::path from = of_scene ? folder : std::filesystem::path(origin.label).parent_path();
-        for (std::string& file : scene.models[n].textures) file = (from / file).lexically_normal().string();
-    }
-    const Entry* layers = document.root.find("layer");
-    for (std::size_t n = 0; layers != nullptr && n < scene.layers.size(); ++n)
-        resolve(layers->value.items[n], scene.layers[n].initial_state_file);
 }
 
 // Throws the problems of the scene's own file first, then those of other files, then those of options.

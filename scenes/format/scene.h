@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +18,7 @@
 #include "render/options/device_options.h"
 #include "render/options/options.h"
 #include "render/options/sun_path.h"
+#include "scenes/format/errors.h"
 #include "scenes/format/layers.h"
 #include "seeds/ground_cover.h"
 #include "seeds/model.h"
@@ -49,6 +51,13 @@ struct DensityFileOptions {
     bool operator==(const DensityFileOptions&) const = default;
 };
 
+// Where the text of a scene names files: by the path of a key ("wind_field[0].files[1]"), a problem without its message.
+// For messages alone: scenes that differ in it are equal.
+struct FilePlaces {
+    std::map<std::string, Problem> of_key;
+    bool operator==(const FilePlaces&) const { return true; }
+};
+
 struct Scene {
     std::string name;  // base name of output files; letters, digits, '-', '_' and '.'
     // True: the density repeats along x and y. Lattices are periodic over one common rectangle, clouds re-enter it where
@@ -71,6 +80,7 @@ struct Scene {
     RenderOptions render;
     std::vector<SunKey> sun_path;  // key frames of render.sun, which then has no date; empty: none
     FrameOptions frames;
+    FilePlaces file_places;
     bool operator==(const Scene&) const = default;
 };
 

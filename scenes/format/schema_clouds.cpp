@@ -75,6 +75,8 @@ void finish_model(const SectionReader& reader, void* owner) {
         reader.report("textures", reader.quoted("textures") + " has " + std::to_string(model.textures.size()) + " files",
                       "expected at most " + std::to_string(kMostTextures));
     }
+    if (reader.find("textures") != nullptr && model.textures.empty())
+        reader.report("textures", reader.quoted("textures") + " names no file", "expected names of PNG files, or no such key");
     if (std::ranges::count(model.textures, std::string()) > 0)
         reader.report("textures", reader.quoted("textures") + " has an empty name", "expected names of PNG files");
     try {

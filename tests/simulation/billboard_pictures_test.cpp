@@ -196,14 +196,16 @@ Scene painted() { return read_scene(fs::path(NEPHOS_SOURCE_DIR) / "scenes/torche
 // Each billboard of a model with textures has one of them, the others none.
 TEST(ModelTextures, EachBillboardHasOneOfItsModels) {
     const Scene scene = painted();
-    const std::shared_ptr<const ModelTextures> textures = read_textures(scene.models);
+    const std::shared_ptr<const ModelTextures> textures = read_textures(scene);
     ASSERT_TRUE(textures);
     EXPECT_EQ(textures->index.size(), 4u);
     std::vector<int> count(4, 0);
     for (std::uint32_t word = 0; word < 1000; ++word) ++count.at(std::size_t(textures->picture_of(scene.models[0], word)));
     EXPECT_GT(*std::ranges::min_element(count), 200);
     EXPECT_EQ(textures->picture_of(BaseModel{}, 7), -1);
-    EXPECT_FALSE(read_textures(std::vector<BaseModel>{BaseModel{}}));
+    Scene plain;
+    plain.models.emplace_back();
+    EXPECT_FALSE(read_textures(plain));
 }
 
 TEST(ModelTextures, AreRelativeToTheFileThatNamesThem) {

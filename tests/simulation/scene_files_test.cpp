@@ -16,7 +16,9 @@
 
 #include "core/error.h"
 #include "density/vdb/vdb_file.h"
+#include "scenes/format/errors.h"
 #include "scenes/format/reader.h"
+#include "simulation/billboard_files.h"
 #include "simulation/layer_simulation.h"
 #include "simulation/simulation.h"
 
@@ -138,6 +140,83 @@ TEST_F(SceneFiles, BadFilesAreNamed) {
     EXPECT_NE(error_of(grids + "\"v.vdb\"\n").find("no float grid"), std::string::npos);
     EXPECT_NE(error_of(grids + "\"p.vdb\"\n").find("has the value 1.4: expected probabilities 0..1"), std::string::npos)
         << error_of(grids + "\"p.vdb\"\n");
+}
+
+// Every file that a scene names and nobody can use has its place in the text, in `validate` all of them at once.
+TEST_F(SceneFiles, BadFilesHaveTheirPlace) {
+    const std::string text = R"(initial_state = "start.vdb"
+[[wind_field]]
+kind = "grid"
+files = ["a.vdb",
+         "none.vdb"]
+[[field.grids]]
+of = "hum"
+file = "p.vdb"
+[[model]]
+name = "Cu"
+seeds = [{}]
+textures = ["wisp.png"]
+[ground]
+height_map = "alps.png"
+)";
+    write<openvdb::Vec3SGrid>("a.vdb", "wind", {1, 0, 0}, {2, 0, 0});
+    write<openvdb::FloatGrid>("p.vdb", "p", 0.1f, 1.4f);
+    std::ofstream(folder_ / "alps.png") << "no picture";
+    const Scene scene = read(text);
+    struct Expected {
+        const char* key;
+        const char* what;
+        int line, column;
+    };
+    const Expected expected[] = {{"lattice.initial_state", "start.vdb: No such file", 3, 17},
+                                 {"wind_field[0].files[1]", "none.vdb: No such file", 7, 10},
+                                 {"field.grids[0].file", "p.vdb: has the value 1.4", 10, 8},
+                                 {"model[0].textures[0]", "wisp.png", 14, 13},
+                                 {"ground.height_map", "alps.png", 16, 14}};
+    try {
+        check_files(scene);
+        FAIL() << "nothing was thrown";
+    } catch (const SceneErrors& errors) {
+        ASSERT_EQ(errors.problems().size(), std::size(expected)) << errors.what();
+        for (std::size_t n = 0; n < std::size(expected); ++n) {
+            const Problem& problem = errors.problems()[n];
+            SCOPED_TRACE(expected[n].key);
+            EXPECT_TRUE(problem.message.starts_with("`" + std::string(expected[n].key) + "`: ")) << problem.message;
+            EXPECT_NE(problem.message.find(expected[n].what), std::string::npos) << problem.message;
+            EXPECT_TRUE(problem.where.file.ends_with("scene.toml"));
+            EXPECT_EQ(problem.where.line, expected[n].line);
+            EXPECT_EQ(problem.where.column, expected[n].column);
+            EXPECT_GT(problem.caret, 0);
+            EXPECT_TRUE(problem.expected.starts_with("expected a file that can be read: ")) << problem.expected;
+        }
+    }
+    const auto place_of = [](const auto& call) -> std::string {
+        try {
+            call();
+        } catch (const SceneErrors& errors) {
+            EXPECT_EQ(errors.problems().size(), 1u);
+            EXPECT_EQ(errors.code() == ErrorCode::io, errors.problems()[0].message.find("1.4") == std::string::npos);
+            return errors.problems()[0].message.substr(0, errors.problems()[0].message.find(':'));
+        }
+        return "none";
+    };
+    EXPECT_EQ(place_of([&] { initial_state(scene); }), "`lattice.initial_state`");
+    EXPECT_EQ(place_of([&] { with_files(scene); }), "`wind_field[0].files[1]`");
+    EXPECT_EQ(place_of([&] { with_files(read("[[field.grids]]\nof = \"hum\"\nfile = \"p.vdb\"\n")); }),
+              "`field.grids[0].file`");
+    EXPECT_EQ(place_of([&] { read_textures(scene); }), "`model[0].textures[0]`");
+    EXPECT_EQ(place_of([&] { read_terrain(scene); }), "`ground.height_map`");
+    Scene built;
+    built.initial_state_file = folder_ / "none.vdb";
+    EXPECT_THROW(
+        {
+            try {
+                check_files(built);
+            } catch (const SceneErrors&) {
+                FAIL() << "there is no text";
+            }
+        },
+        Error);
 }
 
 // Parcels of [field] and of the layer, clouds of skies and a state from a file in one layer.

@@ -53,10 +53,14 @@ class State(Case):
         for setting, says in (("lattice.cell_size_m=25", "cells of 50 m, but the scene's lattice has cells of 25 m"),
                               ("lattice.origin_m=[10,0,1000]", "but the scene's lattice at (10, 0, 1000) m")):
             for command in (["hash", self.scene, "--from", "state.vdb"],
-                            ["state", self.scene, "--from", "state.vdb", "--out", "next.vdb"],
-                            ["run", scene, "--no-render", "--out", "out"]):
+                            ["state", self.scene, "--from", "state.vdb", "--out", "next.vdb"]):
                 with self.subTest(setting=setting, command=command):
                     result = self.refused(3, *command, "--set", setting, says="state.vdb")
+                    self.assertIn(says, result.stderr)
+            for command in (["run", "--no-render", "--out", "out"], ["validate"]):
+                with self.subTest(setting=setting, command=command):
+                    result = self.call(command[0], scene, *command[1:], "--set", setting, status=3)
+                    self.assertRegex(result.stderr, r"from\.toml:4:17: error: `lattice\.initial_state`: .*state\.vdb")
                     self.assertIn(says, result.stderr)
 
     def test_a_run_starts_from_a_state(self):
