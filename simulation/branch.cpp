@@ -17,9 +17,20 @@
 namespace nephos {
 namespace {
 
+// The checkpoint of a run, which is named by its folder or by the file itself.
 std::filesystem::path checkpoint_of(const std::filesystem::path& from) {
+    const auto refuse = [&](const char* what) {
+        throw Error(ErrorCode::io, from.string() + ": " + what + ": expected the folder of a run, or its checkpoint");
+    };
     std::error_code error;
-    return std::filesystem::is_directory(from, error) ? from / "checkpoint.nephos" : from;
+    if (!std::filesystem::exists(from, error)) refuse("no such run");
+    if (!std::filesystem::is_directory(from, error)) {
+        if (!is_checkpoint(from)) refuse("is no checkpoint of a run");
+        return from;
+    }
+    const std::filesystem::path checkpoint = from / "checkpoint.nephos";
+    if (!std::filesystem::exists(checkpoint, error)) refuse("holds no checkpoint of a run");
+    return checkpoint;
 }
 
 RunFolder folder_of(const std::filesystem::path& checkpoint, const Scene& scene) {

@@ -54,7 +54,7 @@ const Section& light_shafts_section() {
     static const Section section{
         "Light shafts",
         "Air in the shadow of clouds scatters less light: what stays lit stands out as shafts, up to the "
-        "last shell. Clouds of voxels and clouds drawn as billboards shade the air, veils do not.",
+        "last shell. Clouds of voxels, clouds drawn as billboards and veils shade the air.",
         {render_key<&RenderOptions::light_shafts, &LightShafts::strength>(
              "strength", "", between(0, 1),
              "Fraction of the light that shaded air loses; 0: no shafts, 1: all of its direct sunlight.",

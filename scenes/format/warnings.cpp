@@ -158,6 +158,63 @@ void add_terrain_keys(const TerrainOptions& terrain, std::vector<std::string>& t
             "`cells`, `feature_m` and `seed` of [terrain] have no effect: they are of `ground.relief`");
 }
 
+// Keys of a layer that is drawn directly.
+void add_direct_keys(const LayerOptions& layer, std::vector<std::string>& to) {
+    const auto add = [&](const char* keys) {
+        to.push_back(
+            fmt::format("layer '{}' is drawn directly: {} no effect without `automaton`", layer.name, keys));
+    };
+    if (layer.light_absorption != 1) add("`light_absorption` has");
+    const bool field = !layer.scatters.empty() || !layer.ellipsoids.empty() || !layer.profile.empty();
+    CouplingOptions plain;
+    if (layer.coupling.min_semi_axis_m == layer.placement.cell_size_m)  // its default
+        plain.min_semi_axis_m = layer.coupling.min_semi_axis_m;
+    if (field || !(layer.coupling == plain))
+        add("its ellipsoids, scatters, profile and coupling have");
+}
+
+// Whether there is any wind, at any time.
+bool blows(const Wind& wind) {
+    return !wind.fields.empty() || std::ranges::any_of(wind.keyframes, [](const WindKeyframe& keyframe) {
+        return std::ranges::any_of(keyframe.levels, [](const WindLevel& level) {
+            return level.velocity.east_m_per_s != 0 || level.velocity.north_m_per_s != 0;
+        });
+    });
+}
+
+// The constant background where a profile or a grid is in its place.
+void add_background(const Scene& scene, std::vector<std::string>& to) {
+    const FieldOptions& field = scene.automaton.field;
+    const Probabilities& constant = field.background;
+    const Probabilities plain = FieldOptions{}.background;
+    const auto replaced = [](const LayerOptions& layer) {
+        return layer.is_veil || !layer.automaton || !layer.profile.empty();
+    };
+    const bool nowhere = scene.layers.empty() ? !field.profile.empty() : std::ranges::all_of(scene.layers, replaced);
+    if (!field.profile.empty() && nowhere && !(constant == plain))
+        to.emplace_back("[field.background] has no effect: [[field.profile]] is in its place");
+    const char* const names[] = {"hum", "act", "ext"};
+    const bool given[] = {constant.hum != plain.hum, constant.act != plain.act, constant.ext != plain.ext};
+    for (const ProbabilityGrid& grid : field.grids)
+        if (given[int(grid.of)])
+            to.push_back(fmt::format("`field.background.{}` has no effect: a file of [[field.grids]] is in its place",
+                                     names[int(grid.of)]));
+    for (const LayerOptions& layer : scene.layers)
+        if (!layer.is_veil && layer.automaton && !layer.profile.empty() && !(layer.background == constant))
+            to.push_back(fmt::format("layer '{}': its `background` has no effect: its `profile` is in its place",
+                                     layer.name));
+}
+
+// Keys that are of clouds which the scene has none of.
+void add_keys_of_clouds(const Scene& scene, std::vector<std::string>& to) {
+    const bool direct = std::ranges::any_of(
+        scene.layers, [](const LayerOptions& layer) { return !layer.is_veil && !layer.automaton; });
+    if (scene.render.light.cfa_clouds_per_frame > 0 && !direct)
+        to.emplace_back("`light.cfa_clouds_per_frame` has no effect: no layer is drawn directly (`automaton = false`)");
+    if (scene.density.refine != 1 && !has_density(scene))
+        to.emplace_back("`density.refine` has no effect: all layers are drawn directly");
+}
+
 }  // namespace
 
 std::vector<std::string> keys_without_effect(const Scene& scene) {
@@ -173,9 +230,12 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
             "`precipitation.splashes` has no effect: it needs rain (`enabled`, `kind`) and level ground, without a "
             "`relief` or `height_map`");
     add_terrain_keys(scene.render.terrain, result);
+    add_background(scene, result);
+    add_keys_of_clouds(scene, result);
     if (sea && scene.ground_cover.enabled)
         result.emplace_back(
-            "[wet_ground] has no effect but for its reflection: rain and snow vanish in a ground of water");
+            "[wet_ground] has no effect but for its reflection and the rings of drops (`ripples`): rain and snow vanish "
+            "in a ground of water");
     // Base models of layers without and with an automaton, and of those that absorb the light in voxels.
     std::set<std::string> drawn, grown, absorbing;
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
@@ -191,16 +251,10 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
                 "layer '{}': `light_absorption` has no effect: no base model of its clouds has a finite "
                 "`light_distance_m`, or they do not drive the automaton",
                 layer.name));
-        if (layer.light_absorption != 1 && !layer.automaton)
+        if (!layer.automaton) add_direct_keys(layer, result);
+        if (layer.entering == Entering::horizon && !blows(layer_wind(scene, n)))
             result.push_back(fmt::format(
-                "layer '{}' is drawn directly: `light_absorption` has no effect without `automaton`",
-                layer.name));
-        const bool field = !layer.scatters.empty() || !layer.ellipsoids.empty() || !layer.profile.empty() ||
-                           !layer.coupling.genera.empty();
-        if (!layer.automaton && field)
-            result.push_back(fmt::format(
-                "layer '{}' is drawn directly: its ellipsoids, scatters, profile and coupling have no "
-                "effect without `automaton`",
+                "layer '{}': no cloud will ever enter or leave: `entering` is \"horizon\", and there is no wind",
                 layer.name));
         if (layer.automaton && layer.shear_s > 0)
             result.push_back(fmt::format(

@@ -14,6 +14,7 @@
 #include "scenes/format/reader.h"
 #include "scenes/format/warnings.h"
 #include "scenes/format/writer.h"
+#include "seeds/genera.h"
 
 namespace nephos {
 namespace {
@@ -260,6 +261,78 @@ base_height_m = 1000
     EXPECT_EQ(notes({"layer[0].coupling.strength=0"}).find(model), 0u);
     EXPECT_EQ(notes({"layer[0].light_absorption=0.5", "model[0].light_distance_m=inf"}).find(layer), 0u);
     EXPECT_EQ(notes({"layer[0].light_absorption=0.5", "layer[0].automaton=false"}).find(direct), 0u);
+}
+
+// Each key alone: where it acts nothing is said, where it does not, one note.
+TEST(Layers, KeysThatDoNothingAreNamed) {
+    const std::string text = R"(
+[[wind]]
+levels = [{ height_m = 0, east_m_per_s = 4 }]
+[[model]]
+name = "Cu"
+seeds = [{}]
+[[sky]]
+name = "fair"
+state = 0
+clouds = 3
+models = "Cu"
+[[layer]]
+name = "low"
+skies = "fair"
+base_height_m = 1000
+)";
+    const auto notes = [&](std::vector<std::string> overrides, const std::string& of) {
+        std::string all;
+        for (const std::string& note : keys_without_effect(read_scene_text(of, "keys.toml", {}, overrides)))
+            all += note + "\n";
+        return all;
+    };
+    const auto starts = [](const std::string& all, const std::string& note) {
+        return all.starts_with(note) && std::ranges::count(all, '\n') == 1;
+    };
+    const std::string direct = "layer[0].automaton=false", profile = "field.profile=[{levels=[{height_m=0,hum=0.1}]}]";
+    const std::string coupling = "layer 'low' is drawn directly: its ellipsoids, scatters, profile and coupling have no";
+    EXPECT_TRUE(starts(notes({direct, "layer[0].coupling.size_scale=2"}, text), coupling));
+    EXPECT_TRUE(starts(notes({direct, "layer[0].coupling.min_semi_axis_m=7"}, text), coupling));
+    EXPECT_EQ(notes({"layer[0].coupling.size_scale=2"}, text), "");
+    EXPECT_TRUE(starts(notes({direct, "density.refine=2"}, text), "`density.refine` has no effect"));
+    EXPECT_EQ(notes({"density.refine=2"}, text), "");
+    EXPECT_TRUE(starts(notes({"light.cfa_clouds_per_frame=1"}, text), "`light.cfa_clouds_per_frame` has no effect"));
+    EXPECT_EQ(notes({direct, "light.cfa_clouds_per_frame=1"}, text), "");
+    const std::string horizon = "layer[0].entering=horizon", calm = "layer 'low': no cloud will ever enter or leave";
+    EXPECT_EQ(notes({horizon}, text), "");
+    EXPECT_EQ(notes({"wind=[]"}, text), "");
+    EXPECT_TRUE(starts(notes({horizon, "wind=[]"}, text), calm));
+    EXPECT_TRUE(starts(notes({horizon, "wind[0].levels[0].east_m_per_s=0"}, text), calm));
+
+    const std::string hum = "field.background.hum=0.5", replaced = "[field.background] has no effect";
+    EXPECT_TRUE(starts(notes({profile, hum}, "seed = 1"), replaced));
+    EXPECT_EQ(notes({profile}, "seed = 1"), "");
+    EXPECT_EQ(notes({hum}, "seed = 1"), "");
+    EXPECT_TRUE(starts(notes({profile, hum}, text), replaced)) << "the layer takes the profile of [field]";
+    EXPECT_EQ(notes({profile, hum, "layer[0].background.ext=0.3"}, text), "") << "the layer has a background";
+    EXPECT_TRUE(starts(notes({"layer[0].profile=[{levels=[{height_m=0}]}]", "layer[0].background.hum=0.3"}, text),
+                       "layer 'low': its `background` has no effect"));
+    const std::string grid = "field.grids=[{of=\"hum\",file=\"a.vdb\"}]";
+    EXPECT_TRUE(starts(notes({grid, hum}, "seed = 1"), "`field.background.hum` has no effect"));
+    EXPECT_EQ(notes({grid, "field.background.ext=0.5"}, "seed = 1"), "");
+}
+
+// Bases of a genus are those of its climate, counted from the ground.
+TEST(Layers, GeneraLieAboveTheGround) {
+    const auto base = [](std::vector<std::string> overrides) {
+        return read_scene_text(
+                   "[lattice]\ncells = [8, 8, 100]\ncell_size_m = 200\n[[sky]]\nname = \"s\"\nstate = 0\n"
+                   "[[layer]]\nname = \"a\"\nskies = \"s\"\ngenus = \"Ci\"\n",
+                   "genus.toml", {}, overrides)
+            .layers.front()
+            .base_height_m;
+    };
+    EXPECT_EQ(base({}), base_height_m(Genus::Ci, Region::temperate));
+    const Range polar = base_height_m(Genus::Ci, Region::polar);
+    EXPECT_EQ(base({"climate.region=polar", "ground.height_m=700"}), (Range{polar.min + 700, polar.max + 700}));
+    EXPECT_EQ(base({"climate.region=polar", "ground.height_m=700", "layer[0].automaton=false"}),
+              (Range{polar.min + 700, polar.max + 700}));
 }
 
 // Between two steps a cloud moves on a straight line that ends where the step puts it.

@@ -117,7 +117,13 @@ TEST_F(BranchTest, RefusesWhatDoesNotFit) {
     EXPECT_NE(error_of(larger, first.folder).find("does not fit the changed scene"), std::string::npos)
         << error_of(larger, first.folder);
     EXPECT_NE(error_of(settings(2, "short"), first.folder).find("expected more `time.steps`"), std::string::npos);
-    EXPECT_NE(error_of(settings(12, "none"), first.folder / "nowhere").find("nowhere"), std::string::npos);
+    const auto refused = [&](const fs::path& from) { return error_of(settings(12, "none"), from); };
+    const std::string expected = ": expected the folder of a run, or its checkpoint";
+    const fs::path nowhere = first.folder / "nowhere", file = first.folder / "manifest.json";
+    EXPECT_EQ(refused(nowhere), nowhere.string() + ": no such run" + expected);
+    EXPECT_EQ(refused(file), file.string() + ": is no checkpoint of a run" + expected);
+    EXPECT_EQ(refused(base_), base_.string() + ": holds no checkpoint of a run" + expected);
+    EXPECT_THROW(scene_text_beside(nowhere), Error);
     RunSettings same_folder = settings(12, "first");
     same_folder.overwrite = true;
     EXPECT_NE(error_of(same_folder, first.folder).find("expected another one"), std::string::npos);
