@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fails when docs/features.md does not agree with the tree: a row names a file, a symbol, a scene, a key or a test that is
 not there, or a key that its scene does not have, lacks one of them, or a shipped scene stands in no row. The root of the
-source tree is the argument; with --self-test the checker itself is tested: it must see each kind of wrong row."""
+source tree is the argument. With a second argument, the `nephos` command, its commands are tried as well: those of the page
+run, and of each row `nephos validate` accepts the settings and does not say that one of them has no effect. With --self-test
+the checker itself is tested: it must see each kind of wrong row."""
 
 import json
 import pathlib
 import re
+import shlex
+import subprocess
 import sys
 import tempfile
 import tomllib
@@ -54,6 +58,46 @@ def rows(text):
             yield number, cells
 
 
+def key_of(setting):
+    """The key that `--set KEY=VALUE` sets, written as for a shell; none when it is written otherwise."""
+    words = shlex.split(setting)
+    match = re.fullmatch(r"([^=]+)=.+", words[1]) if len(words) == 2 and words[0] == "--set" else None
+    return match.group(1) if match else None
+
+
+def without_effect(notes, key):
+    """The lines of notes that say that a key has no effect."""
+    name = re.sub(r"\[\d+\]", "", key).split(".")[-1]
+    said = [line[:found.start()] for line in notes.splitlines() if (found := re.search(" ha(?:s|ve) no effect", line))]
+    return [line for line in said if re.search(rf"`(?:[^`]*\.)?{name}`", line)]
+
+
+def command_problems(root, nephos):
+    """A line for each command of the page that fails, tried in a folder of its own beside the scenes."""
+    text = (root / PAGE).read_text(encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        (pathlib.Path(folder) / "scenes").symlink_to(root / "scenes")
+
+        def call(*arguments):
+            return subprocess.run([nephos, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+        for number, line in enumerate(text.splitlines(), 1):
+            if line.startswith("    nephos "):
+                result = call(*shlex.split(line)[1:])
+                if result.returncode != 0:
+                    yield f"{PAGE}:{number}: {result.stderr}"
+        for number, cells in rows(text):
+            scene, *settings = re.findall(r"`([^`]+)`", cells[2])
+            settings = [setting for setting in settings if setting.startswith("--")]
+            if not settings:
+                continue
+            result = call("validate", scene, *(word for setting in settings for word in shlex.split(setting)))
+            if result.returncode != 0:
+                yield f"{PAGE}:{number}: {result.stderr}"
+            for setting in settings:
+                for note in without_effect(result.stderr, key_of(setting)):
+                    yield f"{PAGE}:{number}: {setting}: {note} has no effect"
+
+
 def row_problems(root, cells, tests, schema):
     """What is wrong with the cells of one row."""
     if len(cells) != len(COLUMNS) or not all(cells):
@@ -77,8 +121,8 @@ def row_problems(root, cells, tests, schema):
             elif (root / scene[0]).is_file() and not has_key(root / scene[0], setting):
                 yield f"{scene[0]} has no {setting}"
             continue
-        match = re.fullmatch(r"--set ([^=]+)=.+", setting)
-        if not match or not is_key(schema, match.group(1)):
+        key = key_of(setting)
+        if not key or not is_key(schema, key):
             yield f"{setting} sets no key"
     if len(test) == 2:
         path = root / test[0]
@@ -136,13 +180,21 @@ def self_test():
     expected.append(f"{PAGE}: no row shows scenes/b.toml")
     if found != expected or count != len(wrong) + 2:
         sys.exit(f"seen {found}, not {expected}")
+    if (key_of("--set 'a[0].b=[{c=1}]'"), key_of("--set a"), key_of("--sat a=1")) != ("a[0].b", None, None):
+        sys.exit("settings are not read as a shell does")
+    notes = "note: a.toml: layer 'x': `shear_s` has no effect without `automaton`\nnote: a.toml: `light.cfa` and `x` have no effect\n"
+    if [len(without_effect(notes, key)) for key in ("layer[1].shear_s", "layer[0].automaton", "light.cfa", "a.shear")] != [1, 0, 1, 0]:
+        sys.exit("notes are not read")
     print(f"{len(expected)} wrong rows seen")
 
 
 def main():
     if sys.argv[1:] == ["--self-test"]:
         return self_test()
-    count, found = problems(pathlib.Path(sys.argv[1]).resolve())
+    root = pathlib.Path(sys.argv[1]).resolve()
+    count, found = problems(root)
+    for nephos in sys.argv[2:]:
+        found += command_problems(root, pathlib.Path(nephos).resolve())
     if count < 50:
         sys.exit(f"only {count} rows found: wrong folder?")
     print("\n".join(found) or f"{count} features, all of them there")

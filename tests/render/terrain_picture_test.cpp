@@ -248,6 +248,42 @@ TEST(TerrainPicture, SunAndCloudsShadeIt) {
     EXPECT_LT(shaded, 0.9 * lit);
 }
 
+// From above: the top of the wall is white above the snow line, its steep sides and the low ground keep their colour.
+TEST(TerrainPicture, SnowLiesOnHighAndGentleGround) {
+    RenderOptions bare = view();
+    bare.camera = {{0, 3000, 2500}, {0, 3000, 0}, 60, 96, 72, 0};
+    RenderOptions snowy = bare;
+    snowy.terrain.snow_line_m = 100;
+    const Picture without = draw(bare, {}), with = draw(snowy, {});
+    const auto sum = [](const Picture& picture, std::size_t n) {
+        return double(picture.beauty[3 * n]) + double(picture.beauty[3 * n + 1]) + double(picture.beauty[3 * n + 2]);
+    };
+    int top = 0, white = 0, side = 0, coloured = 0, low = 0;
+    for (std::size_t n = 0; n < with.pixels(); ++n) {
+        const double ratio = sum(with, n) / sum(without, n);
+        if (!(with.terrain_m[n] < 1e30f)) {
+            ++low;
+            EXPECT_EQ(ratio, 1);
+            continue;
+        }
+        const double u = (double(n % 96) + 0.5 - 48) / 36 * std::tan(0.5235987755982988),
+                     v = (double(n / 96) + 0.5 - 36) / 36 * std::tan(0.5235987755982988);
+        const double z_m = 2500 - double(with.terrain_m[n]) / std::sqrt(1 + u * u + v * v);
+        if (z_m > 399) {
+            ++top;
+            white += ratio > 1.5 ? 1 : 0;
+        } else if (z_m > 150 && z_m < 350) {
+            ++side;
+            coloured += ratio < 1.25 ? 1 : 0;
+        }
+    }
+    EXPECT_GT(top, 500);
+    EXPECT_GT(white, 0.9 * top);
+    EXPECT_GT(side, 30);
+    EXPECT_EQ(coloured, side);
+    EXPECT_GT(low, 500);
+}
+
 TEST(TerrainPicture, StandsInTheSeaUpsideDown) {
     RenderOptions options = view();
     options.ground.pattern = GroundPattern::water;
