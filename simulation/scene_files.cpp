@@ -38,8 +38,8 @@ class Collector {
             problems_.insert(problems_.end(), errors.problems().begin(), errors.problems().end());
         }
     }
-    void throw_if_any() {
-        if (!problems_.empty()) throw SceneErrors(std::move(problems_), code_);
+    void throw_if_any(const Scene& scene) {
+        if (!problems_.empty()) throw_problems(std::move(problems_), scene.file_places.scene_file, code_);
     }
 
   private:
@@ -155,7 +155,7 @@ void check_files(const Scene& scene) {
     for (const TextureFile& texture : texture_files(scene))
         found.add([&] { read_at_key(scene, texture.key, [&] { read_alpha_image(texture.file); }); });
     if (scene.render.terrain.height_map) found.add([&] { read_terrain(scene); });
-    found.throw_if_any();
+    found.throw_if_any(scene);
 }
 
 }  // namespace nephos

@@ -14,8 +14,8 @@
 
 namespace nephos {
 
-// Throws SceneErrors with the place of the key in the scene's text, and the error's code; `error` itself when the place is
-// not known.
+// For a handler of `error`: throws SceneErrors with the place of the key in the scene's text, and the error's code; `error`
+// itself when the place is not known, or when it has one.
 [[noreturn]] void throw_at_key(const Scene& scene, const std::string& key, const Error& error);
 
 // Returns what `read` returns, which reads the file of this key ("model[0].textures[1]"). Every reader of such a file goes

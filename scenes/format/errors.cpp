@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <tuple>
+#include <utility>
 
 #include "scenes/format/text.h"
 
@@ -92,6 +94,23 @@ std::string format(std::span<const Problem> problems) {
 
 SceneErrors::SceneErrors(std::vector<Problem> problems, ErrorCode code)
     : Error(code, message_of(problems), first_place(problems)), problems_(std::move(problems)) {}
+
+void throw_problems(std::vector<Problem> problems, const std::string& scene_file, ErrorCode code) {
+    const auto order = [&](const Problem& problem) {
+        return std::make_tuple(problem.where.line == 0,
+                               problem.where.file == scene_file ? std::string() : problem.where.file,
+                               problem.where.line, problem.where.column);
+    };
+    std::ranges::stable_sort(problems, [&](const Problem& a, const Problem& b) { return order(a) < order(b); });
+    if (problems.size() >= kMostProblems) {
+        problems.resize(kMostProblems);
+        Problem more;
+        more.where.file = problems.front().where.file;
+        more.message = "too many errors, only the first " + std::to_string(problems.size()) + " are listed";
+        problems.push_back(std::move(more));
+    }
+    throw SceneErrors(std::move(problems), code);
+}
 
 std::string_view closest_word(std::string_view word, std::span<const std::string_view> candidates) {
     constexpr std::size_t kLongestWord =

@@ -4,6 +4,7 @@
 // The errors of a scene file, collected in one exception, each with its position, source line and expected
 // value.
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -47,6 +48,14 @@ class SceneErrors : public Error {
   private:
     std::vector<Problem> problems_;
 };
+
+// That are listed: a file of garbage keys would otherwise fill the memory with messages.
+constexpr std::size_t kMostProblems = 1000;
+
+// Throws SceneErrors with the problems of the scene's own file first, then those of other files, then those of options; the
+// last says that there are too many, from kMostProblems on.
+[[noreturn]] void throw_problems(std::vector<Problem> problems, const std::string& scene_file,
+                                 ErrorCode code = ErrorCode::usage);
 
 // Returns the candidate with the smallest edit distance to `word` (insertion, deletion, replacement, swap of
 // neighbours; case counts half) if that is small for the word's length, preferring one that only adds a unit

@@ -66,6 +66,7 @@ const Node* item(const Node* array, std::size_t n) { return array != nullptr ? &
 void resolve_files(Scene& scene, const Document& document, const fs::path& folder) {
     Resolver resolver(scene, document, folder);
     const Node* root = &document.root;
+    scene.file_places.scene_file = document.origin(0).label;
     const std::string state = "VDB with the cells of a state", state_key = "lattice.initial_state";
     resolver.resolve(find(find(root, "lattice"), "initial_state"), state_key, scene.initial_state_file, state);
     for (std::size_t n = 0; n < scene.layers.size(); ++n)

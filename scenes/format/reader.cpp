@@ -2,7 +2,6 @@
 #include "scenes/format/reader.h"
 
 #include <algorithm>
-#include <tuple>
 
 #include "scenes/format/document.h"
 #include "scenes/format/named_files.h"
@@ -11,9 +10,6 @@
 
 namespace nephos {
 namespace {
-
-// A file of garbage keys would otherwise fill the memory with messages.
-constexpr std::size_t kMostProblems = 1000;
 
 std::string key_path(const std::string& section_path, const std::string& name) {
     return section_path.empty() ? name : section_path + "." + name;
@@ -178,24 +174,6 @@ std::string name_from(const std::filesystem::path& file) {
     }
     name.erase(0, name.find_first_not_of("-."));
     return name.empty() ? "scene" : name;
-}
-
-// Throws the problems of the scene's own file first, then those of other files, then those of options.
-[[noreturn]] void throw_problems(std::vector<Problem> problems, const std::string& scene_file) {
-    const auto order = [&](const Problem& problem) {
-        return std::make_tuple(problem.where.line == 0,
-                               problem.where.file == scene_file ? std::string() : problem.where.file,
-                               problem.where.line, problem.where.column);
-    };
-    std::stable_sort(problems.begin(), problems.end(),
-                     [&](const Problem& a, const Problem& b) { return order(a) < order(b); });
-    if (problems.size() >= kMostProblems) {
-        Problem more;
-        more.where.file = problems.front().where.file;
-        more.message = "too many errors, only the first " + std::to_string(problems.size()) + " are listed";
-        problems.push_back(std::move(more));
-    }
-    throw SceneErrors(std::move(problems));
 }
 
 // A problem of the file as a whole.

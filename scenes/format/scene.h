@@ -54,6 +54,7 @@ struct DensityFileOptions {
 // Where the text of a scene names files: by the path of a key ("wind_field[0].files[1]"), a problem without its message.
 // For messages alone: scenes that differ in it are equal.
 struct FilePlaces {
+    std::string scene_file;  // the scene's own
     std::map<std::string, Problem> of_key;
     bool operator==(const FilePlaces&) const { return true; }
 };

@@ -142,9 +142,12 @@ TEST_F(SceneFiles, BadFilesAreNamed) {
         << error_of(grids + "\"p.vdb\"\n");
 }
 
-// Every file that a scene names and nobody can use has its place in the text, in `validate` all of them at once.
+// Every file that a scene names and nobody can use has its place in the text, in `validate` all of them at once, from top
+// to bottom.
 TEST_F(SceneFiles, BadFilesHaveTheirPlace) {
     const std::string text = R"(initial_state = "start.vdb"
+[ground]
+height_map = "alps.png"
 [[wind_field]]
 kind = "grid"
 files = ["a.vdb",
@@ -156,8 +159,6 @@ file = "p.vdb"
 name = "Cu"
 seeds = [{}]
 textures = ["wisp.png"]
-[ground]
-height_map = "alps.png"
 )";
     write<openvdb::Vec3SGrid>("a.vdb", "wind", {1, 0, 0}, {2, 0, 0});
     write<openvdb::FloatGrid>("p.vdb", "p", 0.1f, 1.4f);
@@ -169,10 +170,10 @@ height_map = "alps.png"
         int line, column;
     };
     const Expected expected[] = {{"lattice.initial_state", "start.vdb: No such file", 3, 17},
-                                 {"wind_field[0].files[1]", "none.vdb: No such file", 7, 10},
-                                 {"field.grids[0].file", "p.vdb: has the value 1.4", 10, 8},
-                                 {"model[0].textures[0]", "wisp.png", 14, 13},
-                                 {"ground.height_map", "alps.png", 16, 14}};
+                                 {"ground.height_map", "alps.png", 5, 14},
+                                 {"wind_field[0].files[1]", "none.vdb: No such file", 9, 10},
+                                 {"field.grids[0].file", "p.vdb: has the value 1.4", 12, 8},
+                                 {"model[0].textures[0]", "wisp.png", 16, 13}};
     try {
         check_files(scene);
         FAIL() << "nothing was thrown";
