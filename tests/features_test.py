@@ -66,10 +66,15 @@ def key_of(setting):
 
 
 def without_effect(notes, key):
-    """The lines of notes that say that a key has no effect."""
-    name = re.sub(r"\[\d+\]", "", key).split(".")[-1]
-    said = [line[:found.start()] for line in notes.splitlines() if (found := re.search(" ha(?:s|ve) no effect", line))]
-    return [line for line in said if re.search(rf"`(?:[^`]*\.)?{name}`", line)]
+    """The lines of notes that say that a key, or its whole section, has no effect."""
+    path = re.sub(r"\[\d+\]", "", key)
+    name = path.split(".")[-1]
+
+    def is_of(line):
+        section = re.search(r"(?<! of )\[([\w.]+)\]$", line)
+        return re.search(rf"`(?:[^`]*\.)?{name}`", line) or section and path.startswith(section.group(1) + ".")
+    said = [line[:found.start()] for line in notes.splitlines() if (found := re.search(" ha(?:s|ve) no effect(?! but)", line))]
+    return [line for line in said if is_of(line)]
 
 
 def command_problems(root, nephos):
@@ -182,8 +187,15 @@ def self_test():
         sys.exit(f"seen {found}, not {expected}")
     if (key_of("--set 'a[0].b=[{c=1}]'"), key_of("--set a"), key_of("--sat a=1")) != ("a[0].b", None, None):
         sys.exit("settings are not read as a shell does")
-    notes = "note: a.toml: layer 'x': `shear_s` has no effect without `automaton`\nnote: a.toml: `light.cfa` and `x` have no effect\n"
-    if [len(without_effect(notes, key)) for key in ("layer[1].shear_s", "layer[0].automaton", "light.cfa", "a.shear")] != [1, 0, 1, 0]:
+    notes = """note: a.toml: layer 'x': `shear_s` has no effect without `automaton`
+note: a.toml: `light.cfa` and `x` have no effect
+note: a.toml: [water] has no effect: there is none
+note: a.toml: `g` of [layer.slab] has no effect
+note: a.toml: [wet] has no effect but for its reflection
+"""
+    seen = ["layer[1].shear_s", "light.cfa", "water.colour", "layer[0].slab.g"]
+    unseen = ["layer[0].automaton", "a.shear", "layer[0].slab.halo", "waters.colour", "wet.reflection"]
+    if [key for key in seen + unseen if without_effect(notes, key)] != seen:
         sys.exit("notes are not read")
     print(f"{len(expected)} wrong rows seen")
 
