@@ -14,9 +14,13 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kBatch = 5;    // MSER-5
 constexpr double kLeastPulse = 0.3;  // of the second maximum
 constexpr double kLeastRise = 0.2;   // of it above the minimum before
-constexpr std::size_t kLeastPeriods = 6;
-constexpr double kLeastTimes = 20;  // tau in a steady series
-constexpr double kHalves = 3;       // standard errors between two halves
+constexpr std::size_t kLeastPeriods = 20;
+constexpr double kLeastTimes = 20;  // upper bounds of tau in a steady series
+// The same of whole periods: 10 take a third more steps, and cover the truth of swelling() in series_test.cpp no better.
+constexpr double kLeastPulseTimes = 7;
+constexpr double kForgotten = 2;       // tau of strengths in the warm-up
+constexpr double kLargestShare = 0.5;  // of the values, in the window of lags
+constexpr double kHalves = 3;          // standard errors between two halves
 constexpr double kSparse = 0.01, kOvercast = 0.95;
 
 double mean_of(std::span<const double> values) {
@@ -37,18 +41,30 @@ std::vector<double> batch_means(std::span<const double> values, std::size_t batc
     return means;
 }
 
-// Means over one period after the other of the values at the steps first, first + stride, ... of a series that begins at
-// `begin`: where the period is no multiple of the stride, some have a value more than others.
-std::vector<double> period_means(std::span<const double> values, std::size_t first, std::size_t begin,
-                                 std::size_t period, std::size_t stride) {
-    std::vector<double> means;
+// Mean and variance of the values within one period after the other.
+struct Periods {
+    std::vector<double> means, strengths;
+
+    void drop_first(std::size_t count) {
+        means.erase(means.begin(), means.begin() + std::ptrdiff_t(count));
+        strengths.erase(strengths.begin(), strengths.begin() + std::ptrdiff_t(count));
+    }
+};
+
+// Of the values at the steps first, first + stride, ... of a series that begins at `begin`: where the period is no multiple of
+// the stride, some have a value more than others.
+Periods periods_of(std::span<const double> values, std::size_t first, std::size_t begin, std::size_t period,
+                   std::size_t stride) {
+    Periods periods;
     std::size_t at = 0;
     for (std::size_t end = begin + period; at < values.size(); end += period) {
         const std::size_t start = at;
         while (at < values.size() && first + at * stride < end) ++at;
-        if (at > start) means.push_back(mean_of(values.subspan(start, at - start)));
+        if (at == start) continue;
+        periods.means.push_back(mean_of(values.subspan(start, at - start)));
+        periods.strengths.push_back(variance_of(values.subspan(start, at - start)));
     }
-    return means;
+    return periods;
 }
 
 // The first maximum of rho that rises far enough above the lowest value before it: lag and height; lag 0 if none.
@@ -111,27 +127,53 @@ class Deviations {
     bool constant_ = true;
 };
 
-// Returns true where a pair of lags is not positive: there integrated_time() ends, whatever follows.
-bool is_integrated(std::span<const double> rho) {
-    for (std::size_t lag = 0; lag + 1 < rho.size(); lag += 2)
-        if (rho[lag] + rho[lag + 1] <= 0) return true;
-    return false;
+// The first lag of the first pair that is not positive: there integrated_time() ends, whatever follows.
+std::size_t end_of_pairs(std::span<const double> rho) {
+    std::size_t lag = 0;
+    while (lag + 1 < rho.size() && rho[lag] + rho[lag + 1] > 0) lag += 2;
+    return lag;
 }
 
-// tau of a whole series, of at most as many lags as half of it. Lags beyond the first pair that is not positive do not count,
-// and are not computed.
-double tau_of(std::span<const double> values) {
+// rho of at most as many lags as half of the values. Lags beyond the end of pairs do not count, and are not computed.
+std::vector<double> counted_lags(std::span<const double> values) {
     const Deviations deviations(values);
     std::vector<double> rho(values.size() / 2 + 1, 0.0);
     rho[0] = 1;
-    if (deviations.are_constant()) return integrated_time(rho);
+    if (deviations.are_constant()) return rho;
     for (std::size_t known = 1; known < rho.size();) {
         const std::size_t next = std::min(rho.size(), known + Deviations::kTogether);
         deviations.fill(std::span(rho).first(next), known);
         known = next;
-        if (is_integrated(std::span(rho).first(known))) break;
+        if (end_of_pairs(std::span(rho).first(known)) + 1 < known) break;
     }
-    return integrated_time(rho);
+    return rho;
+}
+
+struct Memory {
+    double time = 1;   // tau, in values
+    double bound = 1;  // larger by its standard error
+};
+
+// Geyer's sum is too small, for the deviations are from a mean that follows the values: each of its 2 W + 1 lags of both signs
+// lacks variance tau / size (Wolff, Comput. Phys. Commun. 156, 2004). The standard error of tau is
+// tau sqrt(2 (2 W + 1) / size) (Madras and Sokal, J. Stat. Phys. 50, 1988).
+Memory memory_of(std::span<const double> rho, std::size_t size) {
+    const double last = std::max(1.0, double(end_of_pairs(rho))) - 1;  // W
+    const double share = std::min((2 * last + 1) / double(size), kLargestShare);
+    const double time = integrated_time(rho) / (1 - share);
+    return {time, time * (1 + std::sqrt(2 * share))};
+}
+
+Memory memory_of(std::span<const double> values) { return memory_of(counted_lags(values), values.size()); }
+
+// Upper bound of tau of pulses, in periods. It is at least that of their strengths, which the means follow: below the noise of
+// single periods a long memory of the means alone is hardly seen.
+double bound_of(const Periods& periods) {
+    return std::max(memory_of(periods.means).bound, memory_of(periods.strengths).bound);
+}
+
+double error_of(std::span<const double> values, double tau) {
+    return std::sqrt(variance_of(values) * tau / double(values.size()));
 }
 
 bool halves_agree(std::span<const double> values, double error_of_mean) {
@@ -139,6 +181,34 @@ bool halves_agree(std::span<const double> values, double error_of_mean) {
     const double difference = mean_of(values.first(half)) - mean_of(values.last(half));
     // Each half has an error sqrt(2) larger than the whole, their difference one twice as large.
     return std::abs(difference) <= kHalves * 2 * error_of_mean + 1e-12;
+}
+
+// Pulses whose level and strength have both settled, seen long enough to tell.
+bool are_steady(const Periods& periods) {
+    const double size = double(periods.means.size());
+    if (periods.means.size() < kLeastPeriods || size < kLeastPulseTimes * bound_of(periods)) return false;
+    const double strengths_tau = memory_of(periods.strengths).time;
+    return halves_agree(periods.means, error_of(periods.means, bound_of(periods))) &&
+           halves_agree(periods.strengths, error_of(periods.strengths, strengths_tau));
+}
+
+// Judges a series that oscillates. The first pulses after a start are not like the others: a common start fires all cells at
+// once, and they fall out of step over many periods. They have forgotten the strength that they start with after twice tau, by
+// when an exponential memory, tau / 2 long, has fallen to 2 %. A cut where the error is least, as MSER-5, would choose by chance
+// the end at which pulses are weak, and a mean of that end alone is biased.
+void judge_pulses(std::span<const double> cover, std::size_t period, Judgement& result) {
+    result.period = period;
+    result.warm_up = 2 * period;
+    if (result.warm_up >= cover.size()) return;
+    const std::size_t count = (cover.size() - result.warm_up) / period;
+    Periods periods = periods_of(cover.subspan(result.warm_up, count * period), 0, 0, period, 1);
+    const std::size_t forgotten = std::size_t(std::ceil(kForgotten * memory_of(periods.strengths).time));
+    const std::size_t cut = std::min(forgotten, count / 2);
+    result.warm_up += cut * period;
+    result.used = (count - cut) * period;
+    periods.drop_first(cut);
+    // With a warm-up above half the series it still drifts where it ends.
+    if (result.warm_up <= cover.size() / 2 && are_steady(periods)) result.regime = Regime::pulsing;
 }
 
 bool is_dead(std::span<const double> cover, bool can_revive) {
@@ -173,11 +243,8 @@ std::vector<double> autocorrelation(std::span<const double> series, std::size_t 
 double integrated_time(std::span<const double> rho) {
     // The first pair is rho(0) + rho(1); the sum over all lags of both signs is twice that of the pairs, less rho(0).
     double sum = 0;
-    for (std::size_t lag = 0; lag + 1 < rho.size(); lag += 2) {
-        const double pair = rho[lag] + rho[lag + 1];
-        if (pair <= 0) break;
-        sum += pair;
-    }
+    const std::size_t end = end_of_pairs(rho);
+    for (std::size_t lag = 0; lag < end; lag += 2) sum += rho[lag] + rho[lag + 1];
     return std::max(1.0, 2 * sum - 1);
 }
 
@@ -216,31 +283,18 @@ Judgement judge(std::span<const double> cover, bool can_revive) {
     result.warm_up = mser_5(cover);
     // A cut at its limit says that the series still drifts where it ends.
     const bool at_limit = result.warm_up / kBatch == cover.size() / kBatch / 2;
-    std::span<const double> left = cover.subspan(result.warm_up);
+    const std::span<const double> left = cover.subspan(result.warm_up);
     const std::vector<double> rho = autocorrelation(left, left.size() / 2);
     const Pulse pulse = second_maximum(rho);
     if (pulse.lag > 0) {
-        result.period = pulse.lag;
         result.pulse = pulse.height;
-        // The first pulses after a start are not like the others: a common start fires all cells at once.
-        const std::size_t settled = std::max(result.warm_up, 2 * pulse.lag);
-        if (settled < cover.size()) {
-            const std::size_t periods = (cover.size() - settled) / pulse.lag;
-            result.warm_up = settled;
-            result.used = periods * pulse.lag;
-            if (periods >= kLeastPeriods) {
-                const std::span<const double> whole = cover.subspan(settled, result.used);
-                const std::vector<double> means = batch_means(whole, pulse.lag);
-                const double error = std::sqrt(variance_of(means) * tau_of(means) / double(means.size()));
-                if (halves_agree(batch_means(whole, pulse.lag), error)) result.regime = Regime::pulsing;
-            }
-        }
+        judge_pulses(cover, pulse.lag, result);
         return result;
     }
     result.used = left.size();
-    const double tau = integrated_time(rho);
-    const double error = std::sqrt(variance_of(left) * tau / double(left.size()));
-    if (at_limit || double(left.size()) < kLeastTimes * tau || !halves_agree(left, error)) return result;
+    const double tau = memory_of(rho, left.size()).bound;
+    if (at_limit || double(left.size()) < kLeastTimes * tau || !halves_agree(left, error_of(left, tau)))
+        return result;
     result.regime = regime_of_level(mean_of(left), Regime::steady);
     return result;
 }
@@ -259,19 +313,19 @@ SeriesMean mean_over(std::span<const double> series, const Judgement& judgement,
     // Batches are whole periods, for within one the values follow the pulse.
     if (judgement.regime == Regime::pulsing && judgement.period >= 2 * stride &&
         judgement.used >= 2 * judgement.period) {
-        const std::vector<double> means =
-            period_means(values, first * stride, judgement.warm_up, judgement.period, stride);
-        result.error = std::sqrt(variance_of(means) * tau_of(means) / double(means.size()));
+        const Periods periods =
+            periods_of(values, first * stride, judgement.warm_up, judgement.period, stride);
+        result.error = error_of(periods.means, bound_of(periods));
         if (result.error > 0) {
             result.effective = result.deviation * result.deviation / (result.error * result.error);
             result.tau = double(values.size()) / result.effective * double(stride);
         }
         return result;
     }
-    const double tau = tau_of(values);
-    result.tau = tau * double(stride);
-    result.effective = double(values.size()) / tau;
-    result.error = result.deviation * std::sqrt(tau / double(values.size()));
+    const Memory memory = memory_of(values);
+    result.tau = memory.time * double(stride);
+    result.effective = double(values.size()) / memory.time;
+    result.error = error_of(values, memory.bound);
     return result;
 }
 

@@ -12,11 +12,19 @@
 //
 //     1. warm-up     the cut that minimises the standard error of what is left, in batches of five
 //                    (MSER-5: White, Simulation 69, 1997), at most half the series
-//     2. pulsing     rho has, after its first minimum, a maximum above 0.3 (and 0.2 above that minimum): its lag is the period. All
-//                    the humid air of a lattice may fire together, and all replicates in phase from their common
-//                    start: they agree, and are wrong together. Then whole periods only, at least six of them, each one
-//                    batch; otherwise tau, and at least 20 tau
-//     3. two halves  of what is left must agree within 3 standard errors of their difference
+//     2. pulsing     rho has, after its first minimum, a maximum above 0.3 (and 0.2 above that minimum): its lag is the
+//                    period. All the humid air of a lattice may fire together, and all replicates in phase from their
+//                    common start: they agree, and are wrong together. Cells fall out of step over many periods, and
+//                    meanwhile the mean drifts with the strength of the pulses, the variance within a period. Then
+//                    whole periods only, each one batch; the warm-up is two periods and twice the tau of the strengths
+//                    instead, at most half the series; what is left is at least 20 periods, and 7 times the tau of
+//                    the means and of the strengths of periods; the halves of both must agree
+//     3. otherwise   at least 20 tau
+//     4. two halves  of what is left must agree within 3 standard errors of their difference
+//
+// tau of a finite series is estimated too small: it is corrected (Wolff, Comput. Phys. Commun. 156, 2004). And a series that is
+// prolonged until it is 20 tau long ends where tau seems small: lengths and errors take tau raised by its own standard
+// error (Madras and Sokal, J. Stat. Phys. 50, 1988), those of pulses the larger of the tau of means and of strengths.
 //
 // What fails is not steady and has no mean: it must be prolonged.
 

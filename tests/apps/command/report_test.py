@@ -69,7 +69,7 @@ class Report(Case):
     def sweep(self, out, *arguments, scene=None, axes=("field.background.ext=0.05,0.1,0.2",), status=0):
         scene = scene or self.write("null.toml", NULL)
         axes = [word for axis in axes for word in ("--axis", axis)]
-        return self.call("sweep", scene, *axes, "--replicates", "3", "--steps", "200..400", "--out", out, *arguments,
+        return self.call("sweep", scene, *axes, "--replicates", "3", "--steps", "200..800", "--out", out, *arguments,
                          status=status)
 
     def page(self, folder, *arguments):

@@ -52,7 +52,7 @@ class Sweep(Case):
         super().setUp()
         self.null = self.write("null.toml", NULL)
 
-    def sweep(self, out, *arguments, axis="field.background.ext=0.05,0.1,0.2", steps="400..1600", status=0):
+    def sweep(self, out, *arguments, axis="field.background.ext=0.05,0.1,0.2", steps="400..3200", status=0):
         return self.call("sweep", self.null, "--axis", axis, "--replicates", "3", "--steps", steps, "--out", out,
                          *arguments, status=status)
 
@@ -226,7 +226,7 @@ direction_deg = 90
     def test_killed_at_any_time_it_goes_on(self):
         self.sweep("whole", "-j", "2")
         arguments = ("sweep", self.null, "--axis", "field.background.ext=0.05,0.1,0.2", "--replicates", "3", "--steps",
-                     "400..1600", "--out", "killed", "-j", "2")
+                     "400..3200", "--out", "killed", "-j", "2")
         for wait, kill in ((0.1, signal.SIGKILL), (0.25, signal.SIGTERM), (0.4, signal.SIGKILL), (0.3, signal.SIGINT)):
             process = self.start(*arguments)
             time.sleep(wait)
@@ -581,7 +581,7 @@ direction_deg = 90
     def test_a_full_disk_stops_cleanly(self):
         limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
         result = self.call("sweep", self.null, "--axis", "field.background.ext=0.05,0.1,0.2", "--replicates", "3", "--steps",
-                           "400..1600", "--out", "full", "-j", "1", preexec_fn=limit, status=3)
+                           "400..3200", "--out", "full", "-j", "1", preexec_fn=limit, status=3)
         self.assertIn("cannot write", result.stderr)
         # What is there is whole, and the sweep goes on from it.
         self.sweep("full", "-j", "2")

@@ -276,9 +276,9 @@ class Studies(Case):
     def test_tracks_have_the_numbers_of_the_command(self):
         scene = nephos.Scene.from_text(NULL_SCENE)
         axes = {"field.background.ext": [0.05, 0.1]}
-        sweep = nephos.sweep(scene, axes, self.folder / "python", replicates=2, steps=(200, 400), tracks=True, workers=2)
+        sweep = nephos.sweep(scene, axes, self.folder / "python", replicates=2, steps=(400, 3200), tracks=True, workers=2)
         self.call("sweep", self.write("null.toml", NULL_SCENE), "--axis", "field.background.ext=0.05,0.1", "--tracks",
-                  "--replicates", "2", "--steps", "200..400", "--out", "command")
+                  "--replicates", "2", "--steps", "400..3200", "--out", "command")
         for name in ("runs.csv", "tracks.csv"):
             self.assertEqual((sweep.folder / name).read_bytes(), (self.folder / "command" / name).read_bytes(), name)
         tracks = sweep.tracks()
