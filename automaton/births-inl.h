@@ -66,14 +66,21 @@ inline void draw_segment(const Segment& g, BirthScratch& s) {
     for (int b = 0; b < g.blocks; ++b) {
         const BlockPlan& plan = s.plans[std::size_t(b)];
         unsigned sparse = 0;
-        for (int draw = 0; draw < 3; ++draw) {
+        for (int draw : {kHum, kAct}) {
             const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
             if (draw_plan.kind == DrawPlan::Kind::none) continue;
-            if (draw == kExt && (s.cloudy[b / 8] >> (b % 8 * 8) & 0xFF) == 0) continue;
             if (is_sparse(draw_plan)) {
                 sparse |= 1u << draw;
             } else {
                 s.dense_blocks[draw][dense[draw]++] = std::uint8_t(b);
+            }
+        }
+        if (plan.draws[kExt].kind != DrawPlan::Kind::none && (s.cloudy[b / 8] >> (b % 8 * 8) & 0xFF) != 0) {
+            s.cloud_cells[b] = count_bits(cloud_of_block(g, b, s));
+            if (is_sparse_extinction(plan.draws[kExt], s.cloud_cells[b])) {
+                sparse |= 1u << kExt;
+            } else {
+                s.dense_blocks[kExt][dense[kExt]++] = std::uint8_t(b);
             }
         }
         if (sparse != 0) queue_sparse(g, b, sparse, s);
@@ -108,7 +115,7 @@ inline void empty_queues(BirthScratch& s) {
 inline BirthScratch& scratch_of_thread() {
     static thread_local const std::unique_ptr<BirthScratch> scratch = std::make_unique<BirthScratch>();
     // Tables are those of a ladder, a seed and a slab.
-    for (UniformDraws& draws : scratch->uniform) draws.table = nullptr;
+    for (UniformBirths& births : scratch->uniform) births.level = -1;
     for (auto& table : scratch->dense_tables) table.reset();
     scratch->initial_table.reset();
     empty_queues(*scratch);

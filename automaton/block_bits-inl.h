@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -241,6 +242,30 @@ inline HWY_NOINLINE void apply_bits(const Segment& g, int draw, const CellBits* 
     }
 }
 #endif
+
+// Returns the place of the set bit of a word that has `rank` set bits below it.
+HWY_INLINE std::uint32_t place_in_word(std::uint64_t word, int rank) {
+#if HWY_ARCH_X86_64 && HWY_TARGET <= HWY_AVX2
+    return std::uint32_t(std::countr_zero(_pdep_u64(std::uint64_t{1} << rank, word)));
+#else
+    for (; rank > 0; --rank) word &= word - 1;
+    return std::uint32_t(std::countr_zero(word));
+#endif
+}
+
+HWY_INLINE int count_bits(const CellBits& bits) {
+    int count = 0;
+    for (std::uint64_t word : bits) count += std::popcount(word);
+    return count;
+}
+
+// Returns the place of the set bit of a block that has `rank` set bits below it, of which below[w] are in words before w; there
+// must be one.
+HWY_INLINE std::uint32_t set_bit(const CellBits& bits, const int (&below)[8], int rank) {
+    int word = 0;
+    for (int next = 1; next < 8; ++next) word += int{below[next] <= rank};
+    return std::uint32_t(64 * word) + place_in_word(bits[word], rank - below[word]);
+}
 
 // Brings bits from the order of layers to that of words: of 16 rows those with even numbers are in one word, those with odd
 // numbers in the next.

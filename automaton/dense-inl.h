@@ -171,17 +171,11 @@ inline void compare_varying(const Segment& g, int draw, int count, BirthScratch&
 }
 
 // Appends the quarters of a block, those with any `cloud` unless that is null.
-inline void add_jobs(std::uint8_t block, const std::uint64_t* cloud, PhiloxJob* jobs, int& count) {
+inline void add_jobs(std::uint8_t block, const CellBits* cloud, PhiloxJob* jobs, int& count) {
     for (int quarter = 0; quarter < 4; ++quarter) {
         jobs[count] = {block, std::uint8_t(quarter)};
-        count += int{cloud == nullptr || (cloud[2 * quarter] | cloud[2 * quarter + 1]) != 0};
+        count += int{cloud == nullptr || ((*cloud)[2 * quarter] | (*cloud)[2 * quarter + 1]) != 0};
     }
-}
-
-inline int count_bits(const std::uint64_t* words) {
-    int count = 0;
-    for (int word = 0; word < 8; ++word) count += std::popcount(words[word]);
-    return count;
 }
 
 // Makes a draw in the blocks in `blocks`, dense in each, and applies it.
@@ -199,7 +193,7 @@ inline void run_dense(const Segment& g, int draw, std::span<const std::uint8_t> 
         }
         if ((s.known_philox >> block & 1) == 0) s.philox_blocks[block] = PhiloxBlock(g.batch(), g.block_word(block));
         s.known_philox |= std::uint64_t{1} << block;
-        const std::uint64_t* const cloud = draw == kExt ? cloud_of_block(g, block, s) : nullptr;
+        const CellBits* const cloud = draw == kExt ? &cloud_of_block(g, block, s) : nullptr;
         constexpr std::uint64_t kEachByte = 0x0101010101010101u;
         if (draw_plan.kind == DrawPlan::Kind::uniform) {
             const std::uint32_t threshold = probability_threshold(draw_plan.p_max);
@@ -209,7 +203,7 @@ inline void run_dense(const Segment& g, int draw, std::span<const std::uint8_t> 
             continue;
         }
         const TopBounds bounds = top_bounds(plan, draw);
-        if (few_undecided(cloud == nullptr ? kBlockCells : count_bits(cloud), bounds)) {
+        if (few_undecided(cloud == nullptr ? kBlockCells : s.cloud_cells[block], bounds)) {
             s.tops[block] = bounds.low * kEachByte;
             s.high_tops[block] = bounds.high * kEachByte;
             add_jobs(block, cloud, s.undecided_jobs, undecided);

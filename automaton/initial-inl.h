@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The first state (docs/adr/0002): births on the empty lattice, from a domain of randomness of their own. Cell c of a
-// block has the counter c; its words 0 and 1 are compared with the thresholds of hum and act.
+// The first state (docs/adr/0002): births on the empty lattice, from a domain of randomness of their own. Cells 2 n
+// and 2 n + 1 of a block share the sub-index n: words 0 and 1, or 2 and 3, are compared with the thresholds of hum and act.
 
 #if defined(NEPHOS_INITIAL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_INITIAL_INL_H_
@@ -30,7 +30,7 @@ inline void draw_initial_block(const Segment& g, int block, const BlockPlan& pla
     const bool varying = kind(kHum) == DrawPlan::Kind::varying || kind(kAct) == DrawPlan::Kind::varying;
     if (varying) locate_columns(plan, s.columns);
     const PhiloxBatch batch{g.keys, 0, std::uint32_t(g.bz) | std::uint32_t(Domain::initial_state) << 16};
-    if (!s.initial_table) s.initial_table.emplace(batch, Draw::counts, sub_of_pairs);
+    if (!s.initial_table) s.initial_table.emplace(batch, Draw::counts, [](std::uint32_t n) { return n; });
     const PhiloxBlock shared(batch, g.block_word(block));
     const hn::CappedTag<std::uint32_t, 16> d;
     alignas(64) std::uint32_t thresholds[2][64];
@@ -56,14 +56,14 @@ inline void draw_initial_block(const Segment& g, int block, const BlockPlan& pla
         }
         if (!possible[kHum] && !possible[kAct]) continue;
         std::uint64_t bits[2] = {};
-        philox_words_01(batch, *s.initial_table, shared, 64 * layer, [&](int c, auto word0, auto word1) HWY_ATTR {
+        philox_pairs(batch, *s.initial_table, shared, 32 * layer, [&](int c, auto of_hum, auto of_act) HWY_ATTR {
             const auto happens = [&](int draw, auto word) HWY_ATTR {
                 // The largest word is taken for the one before, as certain cells have the largest threshold, others an even one.
                 const auto below_certain = hn::Min(word, hn::Set(d, kCertain - 1));
                 return bits_of(d, hn::Lt(below_certain, hn::LoadU(d, thresholds[draw] + c))) << c;
             };
-            bits[kHum] |= happens(kHum, word0);
-            bits[kAct] |= happens(kAct, word1);
+            bits[kHum] |= happens(kHum, of_hum);
+            bits[kAct] |= happens(kAct, of_act);
         });
         s.events[kHum][block][layer] = bits[kHum];
         s.events[kAct][block][layer] = bits[kAct];

@@ -55,16 +55,6 @@ HWY_EXPORT(draw_initial_part_target);
 HWY_EXPORT(find_in_row_target);
 HWY_EXPORT(target_name);
 
-float sparse_rate_bound(const BlockPlan& plan, unsigned draws) {
-    float sum = 0;
-    for (unsigned d = 0; d < 3; ++d) {
-        // Rounding of the rates in the cells may exceed that of the bound by a few units in the last place.
-        if ((draws >> d & 1) != 0)
-            sum += sparse_rate(std::min(plan.draws[d].p_max, kVaryingSparseLimit)) * 1.00001f;
-    }
-    return sum;
-}
-
 void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
     HWY_DYNAMIC_DISPATCH(step_part_target)(planes, random, bz, by_begin, by_end);
 }

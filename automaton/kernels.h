@@ -7,6 +7,7 @@
 // hum and cld are updated in place, cell by cell; act is read around each cell and therefore written to a
 // second plane. Different parts may run in different threads: each writes only its own rows.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -31,15 +32,24 @@ struct StepPlanes {
 // Limits of p_max: a draw below is sparse, any other dense. Part of the random stream (docs/adr/0002).
 inline constexpr float kUniformSparseLimit = 0.125f;  // p is the background's in the whole block
 inline constexpr float kVaryingSparseLimit = 0.25f;   // p varies: evaluating it in every cell would cost more
+// The same of p_max times the cells that are cld: extinctions that a sparse draw has at most, in the mean.
+inline constexpr float kUniformExtinctions = 16, kVaryingExtinctions = 64;
+// Cells of cloud in a block from which on sparse extinctions fall on all its cells, as births do, and those without cloud are
+// left as they are; below, they fall on cells of cloud alone, which are found by their rank.
+inline constexpr int kThickCloud = 128;
 
+// Returns whether a draw of hum or act is sparse.
 inline bool is_sparse(const DrawPlan& plan) {
     if (plan.kind == DrawPlan::Kind::uniform) return plan.p_max < kUniformSparseLimit;
     return plan.kind == DrawPlan::Kind::varying && plan.p_max < kVaryingSparseLimit;
 }
 
-// Returns an upper bound, over the cells of a block, of the summed rates of its sparse draws (a bit each in
-// `draws`).
-float sparse_rate_bound(const BlockPlan& plan, unsigned draws);
+// Returns whether the draw of ext is sparse in a block with `cloud` cells of cloud.
+inline bool is_sparse_extinction(const DrawPlan& plan, int cloud) {
+    if (plan.kind != DrawPlan::Kind::uniform && plan.kind != DrawPlan::Kind::varying) return false;
+    const float limit = plan.kind == DrawPlan::Kind::uniform ? kUniformExtinctions : kVaryingExtinctions;
+    return plan.p_max < kVaryingSparseLimit && plan.p_max * float(cloud) < limit;
+}
 
 // The random numbers and probabilities of one step.
 struct StepRandom {
@@ -74,21 +84,44 @@ inline float sparse_rate(float p) {
     return (z + z) * (1.0f + z2 * (1.0f / 3.0f + z2 * (0.2f + z2 * (1.0f / 7.0f))));
 }
 
-// Selects the draw that a sparse event belongs to (docs/adr/0002): kHum, kAct, kExt, or 3 for a rejected
-// event. `first` and `second` are the event's random words, `level` the rate of its block's ladder level,
+// Returns an upper bound of the rates of a sparse draw in the cells of a block. Rounding of these may exceed that of the bound
+// by a few units in the last place.
+inline float sparse_rate_bound(const DrawPlan& plan) {
+    return sparse_rate(std::min(plan.p_max, kVaryingSparseLimit)) * 1.00001f;
+}
+
+// Selects the draw that a sparse birth belongs to (docs/adr/0002): kHum, kAct, or 2 for a rejected event.
+// `first` and `second` are the event's random words, `level` the rate of its block's ladder level,
 // `rates` those of its cell (0 for draws that are not sparse). v has 53 bits, so that a draw of 2^-30 of the
 // level's rate has a relative precision of 2^-23.
-inline int sparse_draw(std::uint32_t first, std::uint32_t second, double level,
-                       const std::array<float, 3>& rates) {
+inline int sparse_birth(std::uint32_t first, std::uint32_t second, double level, const std::array<float, 2>& rates) {
     const auto bits = std::int64_t{second >> 1} << 22 | first >> 10;
     const double v = double(bits) * (level * 0x1p-53);
     double sum = 0;
     int draw = 0;
-    for (; draw < 3; ++draw) {
+    for (; draw < 2; ++draw) {
         sum += double(rates[std::size_t(draw)]);
         if (v < sum) break;
     }
     return draw;
+}
+
+// Returns the rate of the ladder that the sparse extinctions of a block need, from the bound on the rates of its cells.
+inline float extinction_rate(float rate_bound, int cloud) {
+    return cloud < kThickCloud ? rate_bound * (float(cloud) * 0x1p-9f) : rate_bound;
+}
+
+// Returns 2^-31 of the largest v of the extinctions of a block: the events of the level's rate over the cells that they fall on.
+inline float extinction_unit(float level, int cloud) {
+    return cloud < kThickCloud ? level * 0x1p-22f / float(cloud) : level * 0x1p-31f;
+}
+
+// Returns whether a sparse extinction takes place (docs/adr/0002) in a cell of the given rate: its v is below. `unit` is
+// extinction_unit(), `left` what the choice of the cell leaves of the event's first word. v has the 24 bits of a float32 down to
+// 2^-38 of its largest value.
+inline bool sparse_extinction(std::uint32_t left, std::uint32_t second, float unit, float rate) {
+    const float v = float(std::int32_t(second >> 1)) * unit + float(std::int32_t(left >> 1)) * (unit * 0x1p-31f);
+    return v < rate;
 }
 
 }  // namespace nephos

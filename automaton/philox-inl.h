@@ -73,14 +73,6 @@ HWY_INLINE void philox_round(D d, const PhiloxKeys& keys, std::size_t round, Phi
     x.w1 = product1;
     x.w3 = product0;
 }
-
-// The last round where words 0 and 1 alone are wanted.
-template <class D>
-HWY_INLINE void philox_last_round_of_01(D d, const PhiloxKeys& keys, PhiloxState<D>& x) {
-    const auto product1 = times(d, x.w2, kPhiloxM1);
-    x.w0 = hn::Xor3(hn::ShiftRight<32>(product1), x.w1, hn::Load(d, keys.key0[9]));
-    x.w1 = product1;
-}
 #endif
 
 // Words 0 and 2 of a counter in one 64-bit number.
@@ -207,10 +199,10 @@ template <int kMax>
 struct PhiloxTable {
     // `sub_of(n)` is the sub-index at place n.
     template <class SubOf>
-    PhiloxTable(const PhiloxBatch& batch, Draw draw_number, const SubOf& sub_of) : draw(std::uint32_t(draw_number)) {
+    PhiloxTable(const PhiloxBatch& batch, Draw of, const SubOf& sub_of) : draw(of) {
         const auto k = [](const std::uint64_t(&keys)[8]) { return std::uint32_t(keys[0]); };
         for (std::uint32_t n = 0; n < std::uint32_t(kMax); ++n) {
-            const std::uint64_t product0 = std::uint64_t{kPhiloxM0} * counter_word_0(draw, sub_of(n));
+            const std::uint64_t product0 = std::uint64_t{kPhiloxM0} * block_word_0(draw, sub_of(n));
             const std::uint64_t word = std::uint32_t(product0 >> 32) ^ batch.word3 ^ k(batch.keys.key1[0]);
             const std::uint64_t product1 = kPhiloxM1 * word;
             w0[n] = (product1 >> 32) ^ k(batch.keys.key0[1]);
@@ -218,7 +210,7 @@ struct PhiloxTable {
             w2[n] = std::uint32_t(product0) ^ k(batch.keys.key1[1]);
         }
     }
-    std::uint32_t draw;
+    Draw draw;
     alignas(64) std::uint64_t w0[kMax], w1[kMax], w2[kMax];
 };
 
@@ -271,7 +263,7 @@ HWY_INLINE void philox_jobs(const PhiloxBatch& batch, const PhiloxTable<kMax>& t
         for (int i = 0; i < 8; ++i) {
             const auto sub = std::uint32_t(8 * jobs[n].quarter + i);
             const PhiloxWords x =
-                philox_of(batch, pack_counter(counter_word_0(table.draw, sub), blocks[jobs[n].block].word2));
+                philox_of(batch, pack_counter(block_word_0(table.draw, sub), blocks[jobs[n].block].word2));
             finish(n, i, hn::Set(d, pack_counter(x[0], x[1])), hn::Set(d, pack_counter(x[2], x[3])));
         }
     }
@@ -314,63 +306,38 @@ HWY_INLINE void philox_jobs(const PhiloxBatch& batch, const PhiloxTable<kMax>& t
 #endif
 }
 
-// Cells that are decided by words 0 and 1 of a counter each, in vectors of 32 bits: the sub-index at place n of a table such
-// that philox_words_01() has them in their order.
-inline std::uint32_t sub_of_pairs(std::uint32_t n) {
-    const auto lanes = std::uint32_t(hn::Lanes(hn::CappedTag<std::uint64_t, 8>()));
-    return n / (2 * lanes) * (2 * lanes) + n % lanes * 2 + n / lanes % 2;
-}
-
-// Calls finish(c, word0, word1) with the words 0 and 1 of the sub-indices first + c, first + c + 1, ... of a block, a vector
-// of 32 bits at a time, c < 64; the table is in the order of sub_of_pairs().
+// Calls finish(c, first, second) for 64 cells of a block, a vector of 32 bits at a time: of cell c the words 0 and 1, or where c
+// is odd 2 and 3, of sub-index place + c / 2.
 template <int kMax, class Finish>
-HWY_INLINE void philox_words_01(const PhiloxBatch& batch, const PhiloxTable<kMax>& table,
-                                const PhiloxBlock& block, int first, const Finish& finish) {
+HWY_INLINE void philox_pairs(const PhiloxBatch& batch, const PhiloxTable<kMax>& table, const PhiloxBlock& block, int place,
+                             const Finish& finish) {
 #if HWY_TARGET == HWY_SCALAR
     const hn::CappedTag<std::uint32_t, 16> d32;
     for (int c = 0; c < 64; ++c) {
-        const auto sub = std::uint32_t(first + c);
-        const PhiloxWords x = philox_of(batch, pack_counter(counter_word_0(table.draw, sub), block.word2));
-        finish(c, hn::Set(d32, x[0]), hn::Set(d32, x[1]));
+        const auto sub = std::uint32_t(place + c / 2);
+        const PhiloxWords x = philox_of(batch, pack_counter(block_word_0(table.draw, sub), block.word2));
+        finish(c, hn::Set(d32, x[std::size_t(c % 2 * 2)]), hn::Set(d32, x[std::size_t(c % 2 * 2 + 1)]));
     }
 #else
     using D = hn::CappedTag<std::uint64_t, 8>;
     const D d;
     const hn::Repartition<std::uint32_t, D> d32;
     constexpr int kLanes = int(hn::MaxLanes(d));
-    const auto end = [&](int c, const PhiloxState<D>& x, const PhiloxState<D>& y) HWY_ATTR {
-        finish(c, hn::BitCast(d32, alternate(d, x.w0, y.w0)), hn::BitCast(d32, alternate(d, x.w1, y.w1)));
+    const auto end = [&](int sub, const PhiloxState<D>& x) HWY_ATTR {
+        finish(2 * sub, hn::BitCast(d32, alternate(d, x.w0, x.w2)), hn::BitCast(d32, alternate(d, x.w1, x.w3)));
     };
 #if HWY_TARGET <= HWY_AVX3
-    for (int c = 0; c < 64; c += 4 * kLanes) {
-        auto x = start_at(d, table, block, first + c), y = start_at(d, table, block, first + c + kLanes),
-             z = start_at(d, table, block, first + c + 2 * kLanes),
-             w = start_at(d, table, block, first + c + 3 * kLanes);
-        for (std::size_t round = 2; round < 9; ++round) {
-            philox_round(d, batch.keys, round, x);
-            philox_round(d, batch.keys, round, y);
-            philox_round(d, batch.keys, round, z);
-            philox_round(d, batch.keys, round, w);
-        }
-        philox_last_round_of_01(d, batch.keys, x);
-        philox_last_round_of_01(d, batch.keys, y);
-        philox_last_round_of_01(d, batch.keys, z);
-        philox_last_round_of_01(d, batch.keys, w);
-        end(c, x, y);
-        end(c + 2 * kLanes, z, w);
-    }
+    constexpr int kAtATime = 4;
 #else
-    for (int c = 0; c < 64; c += 2 * kLanes) {
-        auto x = start_at(d, table, block, first + c), y = start_at(d, table, block, first + c + kLanes);
-        for (std::size_t round = 2; round < 9; ++round) {
-            philox_round(d, batch.keys, round, x);
-            philox_round(d, batch.keys, round, y);
-        }
-        philox_last_round_of_01(d, batch.keys, x);
-        philox_last_round_of_01(d, batch.keys, y);
-        end(c, x, y);
-    }
+    constexpr int kAtATime = 2;
 #endif
+    for (int sub = 0; sub < 32; sub += kAtATime * kLanes) {
+        PhiloxState<D> x[kAtATime];
+        for (int n = 0; n < kAtATime; ++n) x[n] = start_at(d, table, block, place + sub + n * kLanes);
+        for (std::size_t round = 2; round < 10; ++round)
+            for (int n = 0; n < kAtATime; ++n) philox_round(d, batch.keys, round, x[n]);
+        for (int n = 0; n < kAtATime; ++n) end(sub + n * kLanes, x[n]);
+    }
 #endif
 }
 

@@ -50,6 +50,10 @@ PoissonLadder::PoissonLadder() {
         }
     }
     tables_.push_back(make_poisson_table(1));
+    for (const PoissonTable& table : tables_) {
+        rates_.push_back(float(table.rate));
+        none_.push_back(table.thresholds.front());
+    }
 }
 
 }  // namespace nephos

@@ -42,17 +42,26 @@ PoissonTable make_poisson_table(double rate);
 class PoissonLadder {
   public:
     PoissonLadder();
-    // Returns the table with the lowest rate >= `rate`, which must be in 0..1.
-    const PoissonTable& level(float rate) const {
+    // Returns the number of the level with the lowest rate >= `rate`, which must be in 0..1.
+    int number_of(float rate) const {
         assert(rate >= 0 && rate <= 1);
-        // Exponent and two bits of mantissa, rounded up, are the number of the level.
+        // Exponent and two bits of mantissa, rounded up.
         const int number = int((std::bit_cast<std::uint32_t>(rate) + 0x1FFFFFu) >> 21) - ((127 + kLowestOctave) << 2);
-        return tables_[std::size_t(std::max(number, 0))];
+        return std::max(number, 0);
+    }
+    const PoissonTable& level(float rate) const { return tables_[std::size_t(number_of(rate))]; }
+    // Returns the rate of a level; every one is a float32.
+    float rate(int number) const { return rates_[std::size_t(number)]; }
+    // Returns the number of events of a level for a uniform 32-bit word. Most words of low levels have none: they read no table.
+    int events(int number, std::uint32_t word) const {
+        return word < none_[std::size_t(number)] ? 0 : tables_[std::size_t(number)].events(word);
     }
 
   private:
     static constexpr int kLowestOctave = -28;
     std::vector<PoissonTable> tables_;
+    std::vector<float> rates_;          // of the tables
+    std::vector<std::uint32_t> none_;  // their first thresholds
 };
 
 }  // namespace nephos

@@ -41,27 +41,29 @@ struct LayerEllipsoid {
     bool bounded;  // outside, where its value is the rim, it must be left out
 };
 
-// The rate of a level of the ladder, and rates of cells in the order in which an event is compared with them: hum, hum + act,
-// hum + act + ext; 0 for draws that are not made.
+// What the sparse events of a block are compared with: births with rates of hum, and of hum + act; extinctions with that of ext.
+// 0 for draws that are not made.
 struct SparseRates {
-    float unit;  // rate of the level * 2^-31
-    float hum, act, ext, two, three;
+    float unit;      // of births: the largest v * 2^-31
+    float ext_unit;  // of extinctions
+    float hum, act, both, ext;
 };
 
-// The sparse draws of the blocks without ellipsoids whose background is the same in all cells.
-struct UniformDraws {
-    const PoissonTable* table = nullptr;  // null: not known yet
-    std::array<float, 3> p{};             // of the background
-    SparseRates rates{};
+// The sparse births of the blocks without ellipsoids whose background is the same in all cells.
+struct UniformBirths {
+    int level = -1;            // of the ladder; negative: not known yet
+    std::array<float, 2> p{};  // of the background
+    SparseRates rates{};       // without those of ext
 };
 
-// The sparse draws of one block.
+// The sparse draws of one block. Its births stand in the queue from 2 `first` on, its extinctions from 2 (`first` +
+// `birth_counters`) on.
 struct SparseJob {
     int block;       // in the segment
     unsigned draws;  // a bit each
-    int events;
-    int first;     // its first counter in the queue; two events a counter
-    bool uniform;  // `rates` are those of all cells; else only the unit is known
+    int first, birth_counters;  // in the queue; two events a counter
+    int births, extinctions;
+    bool uniform;  // `rates` are those of all cells; else only the units are known
     SparseRates rates;
 };
 
@@ -84,10 +86,13 @@ struct BirthScratch {
     alignas(64) CellBits events[2][kSegmentBlocks];  // of the dense draw at hand; of hum and act in the first state
     alignas(64) CellBits ties[kSegmentBlocks];       // cells whose byte equals the top byte of their threshold
     alignas(64) CellBits cloud[kSegmentBlocks];      // cells that are cld, see cloud_of_block()
+    int cloud_cells[kSegmentBlocks];                 // of `cloud`, in blocks that draw extinctions
     alignas(64) CellBits born[kSegmentBlocks];       // cells that are hum, or act, while that is drawn
     std::uint64_t counters[kMaxCounters + kMaxLanes64];  // packed, see philox-inl.h
     // The two words of each event; 16 more, as the last vector of events reads beyond.
     std::uint32_t first[2 * (kMaxCounters + kMaxLanes64) + 16], second[2 * (kMaxCounters + kMaxLanes64) + 16];
+    // Of extinctions, see choose_cells().
+    std::uint32_t cells[2 * (kMaxCounters + kMaxLanes64) + 16], left[2 * (kMaxCounters + kMaxLanes64) + 16];
     std::uint32_t accepted[2 * (kMaxCounters + kMaxLanes64) + 16];  // see pack_event()
     int accepted_count = 0;
     std::uint32_t counts[4 * (kSegmentBlocks + kMaxLanes64)];
@@ -96,10 +101,11 @@ struct BirthScratch {
     // beyond the lattice lead to `outside`.
     std::uint8_t* rows[3][64];
     std::vector<std::uint64_t> outside;
-    float rate_bounds[3][kSegmentBlocks];                   // of each draw: its share of sparse_rate_bound()
-    UniformDraws uniform[8];                                // by the draws, a bit each
+    float rate_bounds[3][kSegmentBlocks];                   // of each draw: sparse_rate_bound()
+    UniformBirths uniform[4];                               // by the draws, a bit each
+    float uniform_ext = 0, uniform_ext_rate = 0;            // the last p_ext that was the same in a block, and its rate
     std::optional<PhiloxTable<32>> dense_tables[3];         // of the random bytes of each draw
-    std::optional<PhiloxTable<kBlockCells>> initial_table;  // of the first state
+    std::optional<PhiloxTable<kBlockCells / 2>> initial_table;  // of the first state
     SparseJob jobs[kSegmentBlocks];
     int job_count = 0, counter_count = 0;
     // The dense draw at hand: quarters of blocks where p is the same in all cells; where it varies and is computed in all
@@ -134,7 +140,7 @@ struct Segment {
     // Word 2 of the block's counters.
     std::uint32_t block_word(int block) const { return std::uint32_t(bx0 + block) | std::uint32_t(by) << 16; }
     std::uint64_t counter(Draw draw, int block, std::uint32_t sub) const {
-        return pack_counter(counter_word_0(std::uint32_t(draw), sub), block_word(block));
+        return pack_counter(block_word_0(draw, sub), block_word(block));
     }
 };
 

@@ -5,7 +5,7 @@
 // as a pure function of a key and a counter. Nothing here has state, so the numbers do not depend on threads,
 // vector width or the order of work. A counter is never used for two purposes; its layout is (docs/adr/0002):
 //
-//     word 0   bits  0-15 sub-index   16-23 draw   24-31 version of the stream
+//     word 0   bits  0-15 sub-index   16-23 draw   24-31 version of the domain's stream
 //     word 1   step (lattice), generation (field), anything the domain defines
 //     word 2   block x | block y << 16 (lattice), index of the item (other domains)
 //     word 3   bits  0-15 block z (lattice) or group   16-31 domain
@@ -18,8 +18,12 @@
 
 namespace nephos {
 
-// Increased with every deliberate change of any bit of any golden hash (docs/adr/0002).
-inline constexpr std::uint32_t kRandomStreamVersion = 1;
+// The version of what the lattice draws, from its first state on (docs/adr/0002). Increased with every deliberate change of
+// any bit of any golden hash; stands in checkpoints, records and files.
+inline constexpr std::uint32_t kRandomStreamVersion = 2;
+// The version of what all other domains draw: places of ellipsoids, clouds of models, skies. It stayed when that of the lattice
+// rose, so that scenes kept their clouds where they were.
+inline constexpr std::uint32_t kItemStreamVersion = 1;
 
 // The purpose of a draw. Domains never share counters.
 enum class Domain : std::uint32_t {
@@ -34,8 +38,9 @@ enum class Domain : std::uint32_t {
     null_model = 8,     // random shadows that statistics are compared with
 };
 
-// The draws of a block of 8x8x8 cells: number of sparse events, sparse events, dense draws of hum, act, ext.
-enum class Draw : std::uint32_t { counts = 0, hum = 1, act = 2, ext = 3, sparse = 4 };
+// The draws of a block of 8x8x8 cells: numbers of sparse births and extinctions, dense draws of hum, act, ext, sparse births,
+// sparse extinctions.
+enum class Draw : std::uint32_t { counts = 0, hum = 1, act = 2, ext = 3, births = 4, extinctions = 5 };
 
 using PhiloxWords = std::array<std::uint32_t, 4>;
 
@@ -47,14 +52,18 @@ inline PhiloxWords philox(std::uint64_t seed, const PhiloxWords& counter) {
     return {out.v[0], out.v[1], out.v[2], out.v[3]};
 }
 
-constexpr std::uint32_t counter_word_0(std::uint32_t draw, std::uint32_t sub_index) {
-    return sub_index | draw << 16 | kRandomStreamVersion << 24;
+constexpr std::uint32_t block_word_0(Draw draw, std::uint32_t sub_index) {
+    return sub_index | std::uint32_t(draw) << 16 | kRandomStreamVersion << 24;
+}
+
+constexpr std::uint32_t item_word_0(std::uint32_t draw, std::uint32_t sub_index) {
+    return sub_index | draw << 16 | kItemStreamVersion << 24;
 }
 
 // Returns the counter of block (bx, by, bz) of the lattice; block coordinates are in units of 8 cells.
 constexpr PhiloxWords block_counter(Domain domain, Draw draw, std::uint32_t step, int bx, int by, int bz,
                                     std::uint32_t sub_index) {
-    return {counter_word_0(std::uint32_t(draw), sub_index), step, std::uint32_t(bx) | std::uint32_t(by) << 16,
+    return {block_word_0(draw, sub_index), step, std::uint32_t(bx) | std::uint32_t(by) << 16,
             std::uint32_t(bz) | std::uint32_t(domain) << 16};
 }
 
@@ -62,7 +71,7 @@ constexpr PhiloxWords block_counter(Domain domain, Draw draw, std::uint32_t step
 // redraws.
 constexpr PhiloxWords item_counter(Domain domain, std::uint32_t group, std::uint32_t index,
                                    std::uint32_t generation, std::uint32_t sub_index) {
-    return {counter_word_0(0, sub_index), generation, index, group | std::uint32_t(domain) << 16};
+    return {item_word_0(0, sub_index), generation, index, group | std::uint32_t(domain) << 16};
 }
 
 // Returns a 32-bit word as a number in [0, 1).

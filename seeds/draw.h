@@ -28,13 +28,13 @@ enum class SkyDraw : std::uint32_t { cloud = 0, place = 1, dissolve = 2, change 
 
 inline PhiloxWords draw_for_cloud(std::uint64_t scene_seed, std::uint32_t model_index, std::uint32_t number,
                                   SeedDraw kind, std::uint32_t index, std::uint32_t sub_index = 0) {
-    return philox(scene_seed, {counter_word_0(std::uint32_t(kind), sub_index), number, index,
+    return philox(scene_seed, {item_word_0(std::uint32_t(kind), sub_index), number, index,
                                model_index | std::uint32_t(Domain::seeds) << 16});
 }
 
 inline PhiloxWords draw_for_sky(std::uint64_t scene_seed, std::uint32_t layer, SkyDraw kind,
                                 std::uint32_t serial) {
-    return philox(scene_seed, {counter_word_0(std::uint32_t(kind), 0), serial, 0,
+    return philox(scene_seed, {item_word_0(std::uint32_t(kind), 0), serial, 0,
                                layer | std::uint32_t(Domain::skies) << 16});
 }
 

@@ -47,12 +47,13 @@ TEST(Counters, AreNeverUsedTwice) {
                 }
             }
             for (std::uint32_t sub = 0; sub < 512; ++sub) {
-                use(block_counter(Domain::lattice, Draw::sparse, step, bx, by, bz, sub));
+                use(block_counter(Domain::lattice, Draw::births, step, bx, by, bz, sub));
+                use(block_counter(Domain::lattice, Draw::extinctions, step, bx, by, bz, sub));
             }
         }
     }
-    for (std::uint32_t cell = 0; cell < 512; ++cell) {
-        use(block_counter(Domain::initial_state, Draw::counts, 0, 3, 4, 5, cell));
+    for (std::uint32_t sub = 0; sub < 256; ++sub) {
+        use(block_counter(Domain::initial_state, Draw::counts, 0, 3, 4, 5, sub));
     }
     for (std::uint32_t scatter : {0u, 1u, 65535u}) {
         for (std::uint32_t index : {0u, 1u, 99999u}) {

@@ -155,6 +155,21 @@ TEST(Step, EqualsTheNaiveTwinOnTheLongestAxes) {
     }
 }
 
+TEST(FirstState, EqualsTheNaiveTwinOnRandomScenes) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        Dice dice(seed);
+        AutomatonOptions o = any_options(dice);
+        o.initial = InitialState::field;
+        const std::vector<ActiveEllipsoid> ellipsoids = Automaton(o).ellipsoids();
+        const reference::Cells twin = reference::first_state(o, ellipsoids);
+        test::with_each_target([&] {
+            const Automaton automaton(o);
+            EXPECT_TRUE(reference::to_cells(automaton.hum(), automaton.act(), automaton.cld()) == twin);
+        });
+    }
+}
+
 std::vector<std::string> hashes_of(const AutomatonOptions& options, int steps) {
     Automaton automaton(options);
     std::vector<std::string> hashes{automaton.hash().hex()};

@@ -29,9 +29,9 @@ std::uint8_t at(const std::vector<std::uint8_t>& plane, const Extent& e, const B
 
 // The random 32-bit word `word` of counter (draw, step, block, sub): docs/adr/0002 in one line.
 std::uint32_t random_word(std::uint64_t seed, std::uint32_t draw, std::uint32_t step, int bx, int by, int bz,
-                          std::uint32_t sub, std::uint32_t word) {
-    const r123::Philox4x32::ctr_type counter = {
-        {sub + draw * 65536u + 1u * 16777216u, step, std::uint32_t(bx + by * 65536), std::uint32_t(bz)}};
+                          std::uint32_t sub, std::uint32_t word, std::uint32_t domain = 0) {
+    const r123::Philox4x32::ctr_type counter = {{sub + draw * 65536u + 2u * 16777216u, step,
+                                                 std::uint32_t(bx + by * 65536), std::uint32_t(bz) + domain * 65536u}};
     const r123::Philox4x32::key_type key = {{std::uint32_t(seed & 0xFFFFFFFFu), std::uint32_t(seed >> 32)}};
     return r123::Philox4x32{}(counter, key).v[word];
 }
@@ -57,18 +57,25 @@ struct BlockDraws {
 
 using Events = std::array<std::vector<bool>, 3>;  // per draw, which of the 512 cells have one
 
-// All sparse draws of the block at once: Poisson events, each of one kind or none by the rates of its cell.
-void sparse_events(const BlockDraws& b, unsigned draws, const PoissonLadder& ladder, Events& events) {
-    const PoissonTable& level = ladder.level(sparse_rate_bound(b.plan, draws));
-    const std::uint32_t uniform = b.word(0, 0, 0);
+std::uint32_t poisson(const PoissonTable& level, std::uint32_t uniform) {
     std::uint32_t count = 0;
     for (std::uint32_t threshold : level.thresholds) count += threshold <= uniform ? 1 : 0;
+    return count;
+}
+
+// The sparse births of the block: Poisson events, each of hum, act or none by the rates of its cell.
+void sparse_births(const BlockDraws& b, unsigned draws, const PoissonLadder& ladder, Events& events) {
+    float bound = 0;
+    for (int draw = 0; draw < 2; ++draw)
+        if ((draws >> draw & 1) != 0) bound += sparse_rate(std::min(b.plan.draws[std::size_t(draw)].p_max, 0.25f)) * 1.00001f;
+    const PoissonTable& level = ladder.level(bound);
+    const std::uint32_t count = poisson(level, b.word(0, 0, 0));
     for (std::uint32_t e = 0; e < count; ++e) {
         const std::uint32_t first = b.word(4, e / 2, e % 2 * 2), second = b.word(4, e / 2, e % 2 * 2 + 1);
         const int cell = int(first % 512);
         const double v = (double(second / 2) + double(first / 1024) / 4194304) / 2147483648 * level.rate;
         double sum = 0;
-        for (int draw = 0; draw < 3; ++draw) {
+        for (int draw = 0; draw < 2; ++draw) {
             if ((draws >> draw & 1) == 0) continue;
             sum += double(sparse_rate(b.p(draw, cell)));
             if (v < sum) {
@@ -76,6 +83,22 @@ void sparse_events(const BlockDraws& b, unsigned draws, const PoissonLadder& lad
                 break;
             }
         }
+    }
+}
+
+// The sparse extinctions of the block: Poisson events on the cells of cloud alone where they are few, else on all.
+void sparse_extinctions(const BlockDraws& b, const std::vector<int>& cloud, const PoissonLadder& ladder, Events& events) {
+    const bool thick = cloud.size() >= 128;
+    const float n = thick ? 512 : float(cloud.size());
+    const PoissonTable& level = ladder.level(sparse_rate(b.plan.draws[kExt].p_max) * 1.00001f * (n / 512));
+    const float unit = float(level.rate) * (512.0f / 2147483648.0f) / n;
+    const std::uint32_t count = poisson(level, b.word(0, 0, 1));
+    for (std::uint32_t e = 0; e < count; ++e) {
+        const std::uint64_t first = b.word(5, e / 2, e % 2 * 2), second = b.word(5, e / 2, e % 2 * 2 + 1);
+        const int cell = thick ? int(first % 512) : cloud[std::size_t(first * cloud.size() / 4294967296u)];
+        const std::uint64_t left = thick ? first / 512 * 512 : first * cloud.size() % 4294967296u;
+        const float v = float(second / 2) * unit + float(left / 2) * (unit / 2147483648.0f);
+        if (v < sparse_rate(b.p(kExt, cell))) events[kExt][std::size_t(cell)] = true;
     }
 }
 
@@ -90,20 +113,27 @@ void dense_events(const BlockDraws& b, int draw, Events& events) {
     }
 }
 
-Events events_of(const BlockDraws& b, const PoissonLadder& ladder, bool any_cloud) {
+// `cloud` has the cells of the block that are cld, rising.
+Events events_of(const BlockDraws& b, const PoissonLadder& ladder, const std::vector<int>& cloud) {
     Events events;
     events.fill(std::vector<bool>(512, false));
     unsigned sparse = 0;
-    for (int draw = 0; draw < 3; ++draw) {
+    for (int draw = 0; draw < 2; ++draw) {
         const DrawPlan& plan = b.plan.draws[std::size_t(draw)];
-        if (plan.kind == DrawPlan::Kind::none || (draw == kExt && !any_cloud)) continue;
+        if (plan.kind == DrawPlan::Kind::none) continue;
         if (is_sparse(plan)) {
             sparse |= 1u << draw;
         } else {
             dense_events(b, draw, events);
         }
     }
-    if (sparse != 0) sparse_events(b, sparse, ladder, events);
+    if (sparse != 0) sparse_births(b, sparse, ladder, events);
+    if (b.plan.draws[kExt].kind == DrawPlan::Kind::none || cloud.empty()) return events;
+    if (is_sparse_extinction(b.plan.draws[kExt], int(cloud.size()))) {
+        sparse_extinctions(b, cloud, ladder, events);
+    } else {
+        dense_events(b, kExt, events);
+    }
     return events;
 }
 
@@ -138,6 +168,34 @@ Lattice to_lattice(const Cells& cells) {
         }
     }
     return lattice;
+}
+
+Cells first_state(const AutomatonOptions& options, const std::vector<ActiveEllipsoid>& ellipsoids) {
+    const Background background(options);
+    const BlockField field(options, ellipsoids, background);
+    const Extent e = options.extent;
+    Cells cells = to_cells(BitPlane(e).view(), BitPlane(e).view(), BitPlane(e).view());
+    std::vector<const FieldEllipsoid*> row;
+    BlockPlan plan;
+    for (int k = 0; k < e.z; ++k) {
+        for (int j = 0; j < e.y; ++j) {
+            for (int i = 0; i < e.x; ++i) {
+                field.collect(j / 8, k / 8, row);
+                field.plan_blocks(i / 8, j / 8, k / 8, row, std::span(&plan, 1));
+                const std::uint32_t cell = std::uint32_t(i % 8 + j % 8 * 8 + k % 8 * 64);
+                const auto happens = [&](int draw) {
+                    const std::uint32_t t = probability_threshold(probability_at(plan, draw, i % 8, j % 8, k % 8));
+                    const std::uint32_t word = random_word(options.seed, 0, 0, i / 8, j / 8, k / 8, cell / 2,
+                                                           cell % 2 * 2 + std::uint32_t(draw), 1);
+                    return t == kCertain || word < t;
+                };
+                const std::size_t n = linear_index(e, i, j, k);
+                cells.hum[n] = happens(kHum);
+                cells.act[n] = happens(kAct);
+            }
+        }
+    }
+    return cells;
 }
 
 Cells grow(const Cells& now, const Boundaries& b) {
@@ -177,14 +235,14 @@ void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uin
                 BlockDraws b{options, field, step, bx, by, bz, {}};
                 field.plan_blocks(bx, by, bz, row, std::span(&b.plan, 1));
                 std::vector<std::pair<int, std::size_t>> inside;  // cell of the block, cell of the lattice
-                bool any_cloud = false;
+                std::vector<int> cloud;
                 for (int cell = 0; cell < 512; ++cell) {
                     const int i = bx * 8 + cell % 8, j = by * 8 + cell / 8 % 8, k = bz * 8 + cell / 64;
                     if (i >= e.x || j >= e.y || k >= e.z) continue;
                     inside.emplace_back(cell, linear_index(e, i, j, k));
-                    any_cloud = any_cloud || cells.cld[inside.back().second] != 0;
+                    if (cells.cld[inside.back().second] != 0) cloud.push_back(cell);
                 }
-                const Events events = events_of(b, ladder, any_cloud);
+                const Events events = events_of(b, ladder, cloud);
                 for (const auto& [cell, n] : inside) {
                     if (events[kHum][std::size_t(cell)]) cells.hum[n] = 1;  // hum' = hum | (rnd < p_hum)
                     if (events[kAct][std::size_t(cell)]) cells.act[n] = 1;  // act' = act | (rnd < p_act)
