@@ -92,11 +92,8 @@ HWY_INLINE void philox_jobs(const PhiloxBatch&, const PhiloxTable<kMax>&, const 
     }
 }
 
-inline std::uint32_t sub_of_pairs(std::uint32_t n) { return n; }
-
 template <int kMax, class Finish>
-HWY_INLINE void philox_words_01(const PhiloxBatch&, const PhiloxTable<kMax>&, const PhiloxBlock&, int,
-                                const Finish& finish) {
+HWY_INLINE void philox_pairs(const PhiloxBatch&, const PhiloxTable<kMax>&, const PhiloxBlock&, int, const Finish& finish) {
     const hn::CappedTag<std::uint32_t, 16> d;
     HWY_ALIGN std::uint64_t words[64];
     uncounted_words(32, words);
