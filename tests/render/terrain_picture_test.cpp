@@ -65,6 +65,15 @@ double difference(const Picture& a, const Picture& b) {
     return most;
 }
 
+// Returns whether a pixel or a neighbour of it sees terrain: edges are smooth, so that level ground beside it is mixed with it.
+bool is_beside_terrain(const Picture& picture, std::size_t n) {
+    const int x = int(n) % picture.width, y = int(n) / picture.width;
+    for (int j = std::max(y - 1, 0); j <= std::min(y + 1, picture.height - 1); ++j)
+        for (int i = std::max(x - 1, 0); i <= std::min(x + 1, picture.width - 1); ++i)
+            if (picture.terrain_m[std::size_t(j * picture.width + i)] < 1e30f) return true;
+    return false;
+}
+
 TEST(TerrainPicture, HidesCloudsBehindIt) {
     const Picture without = draw(view(), {}), behind = draw(view(), balls_at(5000, 200)), before = draw(view(), balls_at(1500, 200));
     int on_wall = 0, hidden = 0, covered = 0;
@@ -85,13 +94,7 @@ TEST(TerrainPicture, LevelGroundIsAsWithoutIt) {
     const Picture with = draw(view(), {}), plain = draw(view(), {}, Splatting::cpu, false);
     EXPECT_TRUE(plain.terrain_m.empty());
     for (std::size_t n = 0; n < plain.pixels(); ++n) {
-        // Pixels beside the terrain have smooth edges.
-        bool beside = false;
-        const int x = int(n) % with.width, y = int(n) / with.width;
-        for (int j = std::max(y - 1, 0); j <= std::min(y + 1, with.height - 1); ++j)
-            for (int i = std::max(x - 1, 0); i <= std::min(x + 1, with.width - 1); ++i)
-                beside = beside || with.terrain_m[std::size_t(j * with.width + i)] < 1e30f;
-        if (beside) continue;
+        if (is_beside_terrain(with, n)) continue;
         for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(with.beauty[3 * n + c], plain.beauty[3 * n + c]) << n;
     }
 }
@@ -262,6 +265,7 @@ TEST(TerrainPicture, SnowLiesOnHighAndGentleGround) {
     for (std::size_t n = 0; n < with.pixels(); ++n) {
         const double ratio = sum(with, n) / sum(without, n);
         if (!(with.terrain_m[n] < 1e30f)) {
+            if (is_beside_terrain(with, n)) continue;
             ++low;
             EXPECT_EQ(ratio, 1);
             continue;
