@@ -245,7 +245,7 @@ inline HWY_NOINLINE void apply_bits(const Segment& g, int draw, const CellBits* 
 
 // Returns the place of the set bit of a word that has `rank` set bits below it.
 HWY_INLINE std::uint32_t place_in_word(std::uint64_t word, int rank) {
-#if HWY_ARCH_X86_64 && HWY_TARGET <= HWY_AVX2
+#if HWY_ARCH_X86_64 && HWY_TARGET <= HWY_AVX2 && !defined(HWY_DISABLE_BMI2_FMA)
     return std::uint32_t(std::countr_zero(_pdep_u64(std::uint64_t{1} << rank, word)));
 #else
     for (; rank > 0; --rank) word &= word - 1;
@@ -253,6 +253,7 @@ HWY_INLINE std::uint32_t place_in_word(std::uint64_t word, int rank) {
 #endif
 }
 
+// Returns the number of cells of a block that are set.
 HWY_INLINE int count_bits(const CellBits& bits) {
     int count = 0;
     for (std::uint64_t word : bits) count += std::popcount(word);

@@ -30,7 +30,7 @@ inline void draw_initial_block(const Segment& g, int block, const BlockPlan& pla
     const bool varying = kind(kHum) == DrawPlan::Kind::varying || kind(kAct) == DrawPlan::Kind::varying;
     if (varying) locate_columns(plan, s.columns);
     const PhiloxBatch batch{g.keys, 0, std::uint32_t(g.bz) | std::uint32_t(Domain::initial_state) << 16};
-    if (!s.initial_table) s.initial_table.emplace(batch, Draw::counts, [](std::uint32_t n) { return n; });
+    if (!s.initial_table) s.initial_table.emplace(batch, Draw::counts);
     const PhiloxBlock shared(batch, g.block_word(block));
     const hn::CappedTag<std::uint32_t, 16> d;
     alignas(64) std::uint32_t thresholds[2][64];

@@ -29,10 +29,11 @@ struct StepPlanes {
     const std::uint64_t* zero_row = nullptr;  // words_per_row zeros with 64 bytes of zeros before and after
 };
 
-// Limits of p_max: a draw below is sparse, any other dense. Part of the random stream (docs/adr/0002).
+// Limits of p_max: births below are sparse, others dense. Extinctions below the second are sparse if they also meet the limits
+// that follow. Part of the random stream (docs/adr/0002).
 inline constexpr float kUniformSparseLimit = 0.125f;  // p is the background's in the whole block
 inline constexpr float kVaryingSparseLimit = 0.25f;   // p varies: evaluating it in every cell would cost more
-// The same of p_max times the cells that are cld: extinctions that a sparse draw has at most, in the mean.
+// Limits of p_max n, n being the cells of the block that are cld: sparse extinctions are fewer, in the mean.
 inline constexpr float kUniformExtinctions = 16, kVaryingExtinctions = 64;
 // Cells of cloud in a block from which on sparse extinctions fall on all its cells, as births do, and those without cloud are
 // left as they are; below, they fall on cells of cloud alone, which are found by their rank.
@@ -117,8 +118,8 @@ inline float extinction_unit(float level, int cloud) {
 }
 
 // Returns whether a sparse extinction takes place (docs/adr/0002) in a cell of the given rate: its v is below. `unit` is
-// extinction_unit(), `left` what the choice of the cell leaves of the event's first word. v has the 24 bits of a float32 down to
-// 2^-38 of its largest value.
+// extinction_unit(), `left` what the choice of the cell leaves of the event's first word. v has 54 random bits in thick cloud, and
+// 56 or more in thin cloud, so that a rate of 2^-30 of its largest value has a relative precision of 2^-24.
 inline bool sparse_extinction(std::uint32_t left, std::uint32_t second, float unit, float rate) {
     const float v = float(std::int32_t(second >> 1)) * unit + float(std::int32_t(left >> 1)) * (unit * 0x1p-31f);
     return v < rate;

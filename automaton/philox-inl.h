@@ -197,12 +197,10 @@ HWY_INLINE void philox_events(const PhiloxBatch& batch, const std::uint64_t* HWY
 //               w2 = hi(M0 w0) ^ w3 ^ k1    w3 = lo(M0 w0)                block ^ table, block
 template <int kMax>
 struct PhiloxTable {
-    // `sub_of(n)` is the sub-index at place n.
-    template <class SubOf>
-    PhiloxTable(const PhiloxBatch& batch, Draw of, const SubOf& sub_of) : draw(of) {
+    PhiloxTable(const PhiloxBatch& batch, Draw of) : draw(of) {
         const auto k = [](const std::uint64_t(&keys)[8]) { return std::uint32_t(keys[0]); };
         for (std::uint32_t n = 0; n < std::uint32_t(kMax); ++n) {
-            const std::uint64_t product0 = std::uint64_t{kPhiloxM0} * block_word_0(draw, sub_of(n));
+            const std::uint64_t product0 = std::uint64_t{kPhiloxM0} * block_word_0(draw, n);
             const std::uint64_t word = std::uint32_t(product0 >> 32) ^ batch.word3 ^ k(batch.keys.key1[0]);
             const std::uint64_t product1 = kPhiloxM1 * word;
             w0[n] = (product1 >> 32) ^ k(batch.keys.key0[1]);
@@ -251,8 +249,7 @@ HWY_INLINE PhiloxState<D> start_at(D d, const PhiloxTable<kMax>& table, const Ph
 #endif
 
 // Calls finish(n, i, words01, words23) for the counters of job n from the i-th on, a vector of 64 bits at a time: words 0 and
-// 1, and 2 and 3, of each. `jobs` reaches up to the next multiple of 4 with jobs that may be done twice; the table's places
-// are sub-indices.
+// 1, and 2 and 3, of each. `jobs` reaches up to the next multiple of 4 with jobs that may be done twice.
 template <int kMax, class Finish>
 HWY_INLINE void philox_jobs(const PhiloxBatch& batch, const PhiloxTable<kMax>& table,
                             const PhiloxBlock* blocks, const PhiloxJob* jobs, int count, const Finish& finish) {

@@ -3,9 +3,10 @@
 
 // The number of events of a block's sparse draw (docs/adr/0002): a Poisson distribution by inversion.
 //
-// Throwing N ~ Poisson(512 * rate) events uniformly, with replacement, on the 512 cells of a block gives
-// every cell independently a Poisson number of events of mean `rate`. Keeping an event with probability r /
-// rate thins the cell to mean r: it is hit with probability 1 - exp(-r), which is p for r = -ln(1 - p).
+// Throwing N ~ Poisson(512 * rate) events uniformly, with replacement, on n cells of a block gives every one of
+// them independently a Poisson number of events of mean 512 rate / n: `rate` where they are all 512 cells.
+// Keeping an event with probability r over that mean thins the cell to mean r: it is hit with probability
+// 1 - exp(-r), which is p for r = -ln(1 - p).
 //
 // Rates come from a ladder, 4 an octave, so that the tables are made once.
 
@@ -60,7 +61,7 @@ class PoissonLadder {
   private:
     static constexpr int kLowestOctave = -28;
     std::vector<PoissonTable> tables_;
-    std::vector<float> rates_;          // of the tables
+    std::vector<float> rates_;         // of the tables
     std::vector<std::uint32_t> none_;  // their first thresholds
 };
 

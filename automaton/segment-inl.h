@@ -31,7 +31,9 @@ inline constexpr int kMaxLanes64 = 8;  // of 64 bits, in the widest vector
 inline constexpr int kSegmentBlocks = 64;
 inline constexpr int kSegmentWords = kSegmentBlocks * kBlockEdge / 64;
 inline constexpr int kMaxJobs = 4 * kSegmentBlocks + 4;  // of a draw; up to 3 more may be written
-inline constexpr int kMaxCounters = 512;  // queued before the sparse draws are run
+// Counters that are queued before the sparse draws are run. One block has at most 219 of births and 123 of extinctions: as many
+// events as the tables of the highest rates hold.
+inline constexpr int kMaxCounters = 512;
 
 // An ellipsoid in one layer of a block, for one draw.
 struct LayerEllipsoid {
@@ -41,8 +43,8 @@ struct LayerEllipsoid {
     bool bounded;  // outside, where its value is the rim, it must be left out
 };
 
-// What the sparse events of a block are compared with: births with rates of hum, and of hum + act; extinctions with that of ext.
-// 0 for draws that are not made.
+// Holds what the sparse events of a block are compared with: births with the rates of hum and of hum + act, extinctions with that
+// of ext; 0 for draws that are not made.
 struct SparseRates {
     float unit;      // of births: the largest v * 2^-31
     float ext_unit;  // of extinctions
@@ -86,7 +88,7 @@ struct BirthScratch {
     alignas(64) CellBits events[2][kSegmentBlocks];  // of the dense draw at hand; of hum and act in the first state
     alignas(64) CellBits ties[kSegmentBlocks];       // cells whose byte equals the top byte of their threshold
     alignas(64) CellBits cloud[kSegmentBlocks];      // cells that are cld, see cloud_of_block()
-    int cloud_cells[kSegmentBlocks];                 // of `cloud`, in blocks that draw extinctions
+    int cloud_cells[kSegmentBlocks];                  // of `cloud`, in blocks that draw extinctions
     alignas(64) CellBits born[kSegmentBlocks];       // cells that are hum, or act, while that is drawn
     std::uint64_t counters[kMaxCounters + kMaxLanes64];  // packed, see philox-inl.h
     // The two words of each event; 16 more, as the last vector of events reads beyond.

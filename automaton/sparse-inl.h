@@ -2,7 +2,7 @@
 
 // The sparse draws (docs/adr/0002): Poisson events on random cells. Births of hum and act are one process on all cells of a
 // block; each event's second word decides by the rates of its cell which of them it is, or none. Extinctions are a process of
-// their own, on the cells that are cld alone. The work is proportional to the events, and the ellipsoids are evaluated only
+// their own, on the cells that are cld or, in thick cloud, on all. The work is proportional to the events, and the ellipsoids are evaluated only
 // there.
 
 #if defined(NEPHOS_SPARSE_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -12,7 +12,10 @@
 #define NEPHOS_SPARSE_INL_H_
 #endif
 
+#include <algorithm>
+#include <array>
 #include <bit>
+#include <cassert>
 #include <cstdint>
 
 #include <hwy/highway.h>
@@ -319,6 +322,7 @@ inline void queue_sparse(const Segment& g, int block, unsigned draws, BirthScrat
     }
     if (births + extinctions == 0) return;
     const int birth_counters = (births + 1) / 2, extinction_counters = (extinctions + 1) / 2;
+    assert(birth_counters + extinction_counters <= kMaxCounters);
     if (s.counter_count + birth_counters + extinction_counters > kMaxCounters) run_queue(g, s);
     // Written where it stays: a copy of what has just been set, by wider loads, would wait for it to reach the cache.
     SparseJob& job = s.jobs[s.job_count++];
@@ -329,6 +333,7 @@ inline void queue_sparse(const Segment& g, int block, unsigned draws, BirthScrat
     job.births = births;
     job.extinctions = extinctions;
     job.uniform = uniform;
+    // What is left of an earlier job belongs to draws that this one does not make.
     if (known != nullptr) {
         job.rates = known->rates;
     } else {
@@ -336,12 +341,14 @@ inline void queue_sparse(const Segment& g, int block, unsigned draws, BirthScrat
     }
     if (extinctions > 0) {
         job.rates.ext_unit = extinction_unit(extinction_level, cloud);
-        const float p = plan.background.low[kExt];
-        if (uniform && p != s.uniform_ext) {
-            s.uniform_ext = p;
-            s.uniform_ext_rate = sparse_rate(p);
+        if (uniform) {
+            const float p = plan.background.low[kExt];
+            if (p != s.uniform_ext) {
+                s.uniform_ext = p;
+                s.uniform_ext_rate = sparse_rate(p);
+            }
+            job.rates.ext = s.uniform_ext_rate;
         }
-        job.rates.ext = s.uniform_ext_rate;
     }
     append_counters(g.counter(Draw::births, block, 0), birth_counters, s);
     append_counters(g.counter(Draw::extinctions, block, 0), extinction_counters, s);

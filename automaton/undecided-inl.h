@@ -38,7 +38,7 @@ HWY_INLINE hn::Vec<hn::RebindToUnsigned<DF>> threshold_of(DF d, V p) {
 // Returns what Philox's first rounds make of the sub-indices of a draw in this slab.
 inline const PhiloxTable<32>& dense_table(const Segment& g, int draw, BirthScratch& s) {
     std::optional<PhiloxTable<32>>& table = s.dense_tables[draw];
-    if (!table) table.emplace(g.batch(), draw_of(draw), [](std::uint32_t n) { return n; });
+    if (!table) table.emplace(g.batch(), draw_of(draw));
     return *table;
 }
 

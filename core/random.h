@@ -18,11 +18,11 @@
 
 namespace nephos {
 
-// The version of what the lattice draws, from its first state on (docs/adr/0002). Increased with every deliberate change of
-// any bit of any golden hash; stands in checkpoints, records and files.
+// The version of what the lattice draws, from its first state on, in its counters and in checkpoints, records and files
+// (docs/adr/0002). Raised with every deliberate change of what is drawn, and with that of kItemStreamVersion.
 inline constexpr std::uint32_t kRandomStreamVersion = 2;
-// The version of what all other domains draw: places of ellipsoids, clouds of models, skies. It stayed when that of the lattice
-// rose, so that scenes kept their clouds where they were.
+// The version of what all other domains draw: ellipsoids, clouds, skies, seeds of layers and of studies, rain. Apart, so that
+// scenes keep their clouds when the stream of the lattice changes. No file names it: when it is raised, the one above is, too.
 inline constexpr std::uint32_t kItemStreamVersion = 1;
 
 // The purpose of a draw. Domains never share counters.

@@ -5,7 +5,9 @@
 
 #include "core/random.h"
 
+#include <bit>
 #include <cmath>
+#include <random>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -144,9 +146,10 @@ void expect_probability(const Frequency& f, double p, const char* what) {
     EXPECT_NEAR(f.pairs, f.pair_places * p * p, 4.5 * pair_sigma + 3) << what << " pairs, p = " << p;
 }
 
-// Each p visits another path: exact background level, its limit, dense with and without ties, certainty.
+// Each p visits another path: exact background level, the limit of births, that of extinctions in full blocks, dense with and
+// without ties, certainty.
 TEST(Births, HaveTheBackgroundsProbability) {
-    for (double p : {1e-5, 0.001, 0.1, 0.124, 0.125, 0.3, 0.5, 0.997, 1.0, 0.0}) {
+    for (double p : {1e-5, 0.001, 0.031, 0.032, 0.1, 0.124, 0.125, 0.3, 0.5, 0.997, 1.0, 0.0}) {
         AutomatonOptions o{.extent = {250, 199, 41}};
         o.field.background = {p, p, p};
         o.initial = InitialState::empty;
@@ -165,9 +168,43 @@ TEST(Births, HaveTheBackgroundsProbability) {
     }
 }
 
+// Sets each cell with the probability `density`.
+BitPlane random_cloud(Extent extent, double density) {
+    BitPlane cloud(extent);
+    std::mt19937_64 words;
+    for (int k = 0; k < extent.z; ++k)
+        for (int j = 0; j < extent.y; ++j)
+            for (int i = 0; i < extent.x; ++i) cloud.set(i, j, k, double(words() >> 11) * 0x1p-53 < density);
+    return cloud;
+}
+
+// Cloud of each density visits another way of its extinction: by rank, on all cells, dense; at 0.24 and 0.26 blocks have fewer
+// or more than 128 cells of cloud. Only these can be hit, each with p.
+TEST(Births, ExtinguishCloudOfAnyDensityWithTheirProbability) {
+    for (double density : {0.004, 0.03, 0.1, 0.24, 0.26}) {
+        for (double p : {1e-4, 0.01, 0.12, 0.2, 0.24, 0.26}) {
+            AutomatonOptions o{.extent = {250, 199, 41}, .seed = 11};
+            o.field.background = {0, 0, p};
+            Lattice start{BitPlane(o.extent), BitPlane(o.extent), random_cloud(o.extent, density)};
+            const BitPlane before = start.cld;
+            Automaton automaton(o, std::move(start));
+            automaton.step();
+            const BitPlaneView after = automaton.cld();
+            double hits = 0;
+            for (std::size_t n = 0; n < after.word_count(); ++n) {
+                EXPECT_EQ(after.words[n] & ~before.words()[n], 0u);
+                hits += std::popcount(before.words()[n] & ~after.words[n]);
+            }
+            const double cells = double(before.count());
+            EXPECT_NEAR(hits, cells * p, 4.5 * std::sqrt(cells * p * (1 - p))) << "cloud " << density << ", p = " << p;
+        }
+    }
+}
+
 // Inside ellipsoids p differs from cell to cell. Cells are gathered by their p into classes, over many seeds,
 // and each class must be hit as often as its p says; the sum over classes is a chi-square.
-double chi_square_per_class(const AutomatonOptions& base, int draw, int seeds) {
+// `density` of cloud at the start, of which extinction hits a part.
+double chi_square_per_class(const AutomatonOptions& base, int draw, int seeds, double density = 1) {
     constexpr int kClasses = 12;
     std::vector<double> expected(kClasses), variance(kClasses), hits(kClasses);
     double highest = 0;
@@ -176,7 +213,8 @@ double chi_square_per_class(const AutomatonOptions& base, int draw, int seeds) {
         AutomatonOptions o = base;
         o.seed = std::uint64_t(seed) * 7919;
         Lattice start{BitPlane(o.extent), BitPlane(o.extent), BitPlane(o.extent)};
-        for (std::uint64_t& word : start.cld.words()) word = draw == kExt ? ~std::uint64_t{0} : 0;
+        if (draw == kExt) start.cld = random_cloud(o.extent, density);
+        const BitPlane cloud = start.cld;
         Automaton automaton(o, std::move(start));
         if (p_of_cell.empty()) {
             const auto ellipsoids = automaton.ellipsoids();
@@ -197,6 +235,7 @@ double chi_square_per_class(const AutomatonOptions& base, int draw, int seeds) {
         for (int k = 0; k < o.extent.z; ++k) {
             for (int j = 0; j < o.extent.y; ++j) {
                 for (int i = 0; i < o.extent.x; ++i, ++n) {
+                    if (draw == kExt && !cloud.view().get(i, j, k)) continue;
                     const double p = p_of_cell[n];
                     const auto c = std::size_t(std::min(kClasses - 1.0, p / highest * kClasses));
                     expected[c] += p;
@@ -218,7 +257,7 @@ double chi_square_per_class(const AutomatonOptions& base, int draw, int seeds) {
 }
 
 TEST(Births, HaveTheEllipsoidsProbability) {
-    for (double scale : {0.02, 0.2, 0.24, 0.9}) {  // sparse three times, then dense
+    for (double scale : {0.02, 0.2, 0.24, 0.9}) {  // births sparse three times, then dense
         AutomatonOptions o{.extent = {64, 56, 48}};
         o.placement.cell_size_m = 10;
         o.field.background = {0.05 * scale, 0, scale};
@@ -236,6 +275,11 @@ TEST(Births, HaveTheEllipsoidsProbability) {
             const double chi_square = chi_square_per_class(o, draw, 12);
             EXPECT_LT(chi_square, 2.7) << "draw " << draw << ", scale " << scale;  // P < 0.002 for 12 classes
             EXPECT_GT(chi_square, 0.1) << "draw " << draw << ", scale " << scale;
+        }
+        for (double density : {0.05, 0.24, 0.4}) {  // extinctions by rank, either way, and on all cells
+            const double chi_square = chi_square_per_class(o, kExt, 24, density);
+            EXPECT_LT(chi_square, 2.7) << "cloud " << density << ", scale " << scale;
+            EXPECT_GT(chi_square, 0.1) << "cloud " << density << ", scale " << scale;
         }
     }
 }

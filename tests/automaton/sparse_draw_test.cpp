@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
-#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -68,40 +67,38 @@ TEST(SparseDraw, TakesNoBitOfTheCell) {
     }
 }
 
-// The share of the values of an extinction's v below a rate, counted over the upper bits and where these tie over the lower
-// ones, is the rate over the largest v: to 10^-6 of itself, down to a rate of 10^-9 of the largest.
+// The share of the values of an extinction's v below a rate is the rate over the largest v: to 10^-6 of itself, down to a rate of
+// 10^-9 of the largest. Values are counted as they are drawn, in order: by the second word, and where that ties by what the
+// choice of a cell leaves of the first, which are the multiples of n in thin cloud (of one cell every other), and of 512 in thick cloud.
 TEST(SparseExtinction, HasTheShareOfItsRate) {
     const PoissonLadder ladder;
-    for (int cloud : {1, 3, 80, 512}) {
+    for (int cloud : {1, 3, 80, 127, 128, 512}) {
+        const std::int64_t apart = cloud < kThickCloud ? std::max(cloud, 2) : 512, left = (std::int64_t{1} << 32) / apart;
         for (double ratio = 1; ratio < 2e9; ratio *= 10) {
             const float rate = sparse_rate(float(0.2 / ratio));
             const PoissonTable& level = ladder.level(extinction_rate(sparse_rate(0.2f) * 1.00001f, cloud));
             const float unit = extinction_unit(float(level.rate), cloud);
             const double largest = level.rate * (cloud < kThickCloud ? 512.0 / cloud : 1);
-            const auto happens = [&](std::int64_t value) {  // of 62 bits
-                return sparse_extinction(std::uint32_t(value & 0x7FFFFFFF) << 1, std::uint32_t(value >> 31) << 1, unit, rate);
-            };
-            std::int64_t low = 0, high = std::int64_t{1} << 62;
+            std::int64_t low = 0, high = left << 31;
             while (low < high) {
                 const std::int64_t middle = low + (high - low) / 2;
-                if (happens(middle)) {
+                if (sparse_extinction(std::uint32_t(middle % left * apart), std::uint32_t(middle / left) << 1, unit, rate)) {
                     low = middle + 1;
                 } else {
                     high = middle;
                 }
             }
-            EXPECT_NEAR(std::ldexp(double(low), -62) * largest, rate, 1e-6 * rate) << cloud << " cells, ratio " << ratio;
+            EXPECT_NEAR(double(low) / double(left << 31) * largest, rate, 1e-6 * rate) << cloud << " cells, ratio " << ratio;
         }
     }
 }
 
 // A draw whose rate is less than half a unit in the last place of a frequent one's, as often as its p says:
 // 20 births are expected, and a Poisson count of that mean is below 3 or above 46 with a probability of
-// 10^-6. The frequent draw is hum, whose rate is in the upper half of the level's, where float32 is coarsest. Each birth of
-// act is cloud in the next step.
+// 10^-6. The frequent draw is hum, whose rate is in the upper half of the level's, where float32 is coarsest.
 TEST(Births, KeepARareDrawBesideAFrequentOne) {
     constexpr double kFrequent = 0.1, kRare = 3.7e-9, kExpected = 20;
-    AutomatonOptions o{.extent = {512, 512, 64}, .seed = 20, .initial = InitialState::empty};
+    AutomatonOptions o{.extent = {512, 512, 64}, .seed = 20};
     o.field.background = {kFrequent, kRare, 0};
     const auto cells = double(o.extent.cells());
     const int steps = int(std::lround(kExpected / (kRare * cells)));
@@ -121,7 +118,7 @@ TEST(Births, KeepARareDrawBesideAFrequentOne) {
 std::span<const std::uint64_t> words_of(BitPlaneView plane) { return {plane.words, plane.word_count()}; }
 
 // Extinctions draw nothing that births see: with one seed, hum and act are the same whatever p_ext is, so that runs which
-// differ in it have common random numbers.
+// differ in it have common random numbers. Winds of whole levels move the planes alike.
 TEST(Births, AreTheSameForAnyExtinction) {
     AutomatonOptions o{.extent = {130, 70, 20}, .seed = 9};
     o.boundaries = {Boundary::periodic, Boundary::periodic, Boundary::open};
@@ -129,6 +126,7 @@ TEST(Births, AreTheSameForAnyExtinction) {
     parcel.centre_m = {3000, 1500, 500};
     parcel.centre = {0.3, 0.02, 0.01};
     o.field.ellipsoids = {parcel};
+    o.wind.keyframes = {{0, {{0, {11, -3}}, {1000, {17, 5}}}}};
     const auto run = [&](double ext) {
         o.field.background = {0.02, 0.001, ext};
         Automaton automaton(o);

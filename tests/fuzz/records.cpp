@@ -10,6 +10,7 @@
 #include "study/packed_series.h"
 
 #include "automaton/checkpoint.h"
+#include "core/random.h"
 #include "tests/fuzz/target.h"
 #include "tests/study/hand_packed.h"
 
@@ -19,14 +20,18 @@ using namespace nephos;
 
 constexpr std::string_view kHashField = ",\"xxh3\":\"";
 
-constexpr std::string_view kVersion = "\"statistics_version\":";
-
-// The line with the version of this program's statistics, so that inputs outlive one.
-std::string of_this_version(std::string line) {
-    const std::size_t at = line.find(kVersion);
+// The line with another number after a key.
+std::string with_number(const std::string& line, std::string_view key, std::uint64_t number) {
+    const std::size_t at = line.find(key);
     if (at == line.npos) return line;
-    const std::size_t begin = at + kVersion.size(), end = line.find_first_not_of("0123456789", begin);
-    return line.substr(0, begin) + std::to_string(NEPHOS_STATISTICS_VERSION) + (end == line.npos ? "" : line.substr(end));
+    const std::size_t begin = at + key.size(), end = line.find_first_not_of("0123456789", begin);
+    return line.substr(0, begin) + std::to_string(number) + (end == line.npos ? "" : line.substr(end));
+}
+
+// The line with the versions of this program's statistics and random stream, so that inputs outlive them.
+std::string of_this_version(const std::string& line) {
+    return with_number(with_number(line, "\"statistics_version\":", NEPHOS_STATISTICS_VERSION), "\"random_stream_version\":",
+                       kRandomStreamVersion);
 }
 
 // Each line that has a hash, with the hash of what stands before it.

@@ -228,7 +228,7 @@ TEST(Draws, NeverShareACounter) {
             }
             for (auto kind : {SkyDraw::cloud, SkyDraw::place, SkyDraw::dissolve})
                 add(draw_for_sky(1, a, kind, b));
-            for (auto draw : {Draw::counts, Draw::hum, Draw::act, Draw::ext}) {
+            for (auto draw : {Draw::counts, Draw::hum, Draw::act, Draw::ext, Draw::births, Draw::extinctions}) {
                 add(philox(1, block_counter(Domain::lattice, draw, a, int(b), 0, 0, 0)));
             }
         }

@@ -68,8 +68,7 @@ HWY_INLINE void philox_events(const PhiloxBatch&, const std::uint64_t*, int coun
 
 template <int kMax>
 struct PhiloxTable {
-    template <class SubOf>
-    PhiloxTable(const PhiloxBatch&, Draw, const SubOf&) {}
+    PhiloxTable(const PhiloxBatch&, Draw) {}
 };
 
 struct PhiloxBlock {
