@@ -80,6 +80,24 @@ HWY_INLINE Floats part_above(const ResolvedNoise& noise, float level) {
     return hn::Div(set(1.0f), hn::Add(set(1.0f), hn::Exp(Lanes(), hn::Mul(set(1.702f), x))));
 }
 
+// Returns noise as a pixel sees it, whose footprint is long and narrow near the horizon: the mean of kProbes places along it, so
+// that what it resolves across the view is not lost to its length (Heckbert 1989 on elliptical footprints; probes as in McCormack
+// et al. 1999).
+HWY_INLINE Floats probed_noise(std::span<const NoiseOctave> octaves, const Floats3& point, const Footprint& print) {
+    constexpr int kProbes = 4;
+    const Floats width = hn::Sqrt(hn::MulAdd(print.across_x, print.across_x, hn::Mul(print.across_y, print.across_y)));
+    if (hn::AllTrue(Lanes(), hn::Le(print.longest, hn::Mul(set(1.5f), width))))
+        return resolved_noise(octaves, point, print.longest).value;
+    const Floats size = hn::Max(width, hn::Mul(set(1.0f / kProbes), print.longest));
+    Floats sum = hn::Zero(Lanes());
+    for (int n = 0; n < kProbes; ++n) {
+        const Floats part = set((float(n) + 0.5f) / kProbes - 0.5f);
+        const Floats3 probe{hn::MulAdd(part, print.along_x, point.x), hn::MulAdd(part, print.along_y, point.y), point.z};
+        sum = hn::Add(sum, resolved_noise(octaves, probe, size).value);
+    }
+    return hn::Mul(set(1.0f / kProbes), sum);
+}
+
 inline constexpr float kWoodLevel = 0.7f;  // above which lies 0.24 of noise of variance 1
 
 // Returns the albedo relative to that of plain ground, at points relative to the eye.
@@ -120,8 +138,8 @@ HWY_INLINE Floats3 country_albedo(const Country& country, const Floats3& point, 
     albedo = mix(albedo, set3({country.hedge[0], country.hedge[1], country.hedge[2], 0}), {hedges, hedges, hedges});
     const Floats woods = part_above(resolved_noise(country.woods, point, print.longest), kWoodLevel);
     albedo = mix(albedo, set3({country.wood[0], country.wood[1], country.wood[2], 0}), {woods, woods, woods});
-    const Floats tone = hn::MulAdd(set(0.07f), resolved_noise(country.tones, point, print.longest).value,
-                                   hn::Mul(set(0.09f), resolved_noise(country.tussocks, point, print.longest).value));
+    const Floats tone = hn::MulAdd(set(0.09f), probed_noise(country.tones, point, print),
+                                   hn::Mul(set(0.15f), probed_noise(country.tussocks, point, print)));
     return times(hn::Max(hn::Add(one, tone), zero), albedo);
 }
 

@@ -35,7 +35,7 @@ Country country_of(const Ground& ground, const Vec3& eye_m) {
     country.bends = noise_octaves({4 * ground.field_m, 0.61, 2, 1, kSeed + 101}, eye_m);
     country.woods = noise_octaves({9 * ground.field_m, 0.5, 9, 0.62, kSeed + 202}, eye_m);
     country.tones = noise_octaves({17 * ground.field_m, 0.37, 5, 0.8, kSeed + 303}, eye_m);
-    country.tussocks = noise_octaves({40, 0.4, 6, 0.8, kSeed + 404}, eye_m);
+    country.tussocks = noise_octaves({40, 0.45, 8, 0.9, kSeed + 404}, eye_m);
     return country;
 }
 

@@ -35,6 +35,17 @@ vec3 row_of_fields(float x, float width, uint row) {
     return mix(crop_of(low, row), crop_of(low + 1.0, row), upper_part(along, width));
 }
 
+// Returns noise as a pixel sees it, at places along its footprint.
+float probed_noise(GroundNoise noise, vec2 point, Footprint print) {
+    const int kProbes = 4;
+    float width = length(print.across);
+    if (print.longest <= 1.5 * width) return resolved_noise(noise, point, print.longest).x;
+    float size = max(width, print.longest / float(kProbes)), sum = 0.0;
+    for (int n = 0; n < kProbes; ++n)
+        sum += resolved_noise(noise, point + ((float(n) + 0.5) / float(kProbes) - 0.5) * print.along, size).x;
+    return sum / float(kProbes);
+}
+
 // Returns the albedo relative to that of plain ground.
 vec3 country_albedo(vec2 point, Footprint print) {
     vec2 turned = point + vec2(3170.0, -1230.0);
@@ -53,7 +64,7 @@ vec3 country_albedo(vec2 point, Footprint print) {
     albedo = mix(albedo, ground_data.hedge.rgb, min(hedge_part(at.y, full.y, ground_data.hedge_cells), 1.0));
     albedo = mix(albedo, ground_data.wood.rgb,
                  part_above(resolved_noise(ground_data.woods, point, print.longest), 0.7));
-    float tone = 0.07 * resolved_noise(ground_data.tones, point, print.longest).x +
-                 0.09 * resolved_noise(ground_data.tussocks, point, print.longest).x;
+    float tone = 0.09 * probed_noise(ground_data.tones, point, print) +
+                 0.15 * probed_noise(ground_data.tussocks, point, print);
     return max(1.0 + tone, 0.0) * albedo;
 }
