@@ -31,13 +31,15 @@ std::vector<std::string> shipped_scenes() {
     return scenes;
 }
 
-// Small pictures, in which voxels are merged as in those of the shipped size; all else is as shipped.
+// Small pictures, in which voxels are merged as in those of the shipped size; all else is as shipped, but for an unbounded disc of
+// the sun: it is 60,000 times as bright as white, so that what shows of it behind a thick cloud is the rounding of 1 - opacity.
 Scene small_pictures_of(const std::string& file) {
     Scene scene = read_scene(scenes_folder() / file);
     Camera& camera = scene.render.camera;
     scene.render.level_of_detail.pixels *= 108.0 / camera.height;
     camera.width = 144;
     camera.height = 108;
+    if (camera.glare > 0) scene.render.atmosphere.sun_disc = false;
     return scene;
 }
 
