@@ -132,7 +132,8 @@ void add_validate_command(CLI::App& app, Action& action) {
     command->add_flag("--print", a->print, "Print the scene with every key and default spelled out");
     add_json(*command, a->work);
     command->footer(
-        "Exit status 0: all scenes are valid; 2: at least one is not; 3: at least one, or a file that it names, cannot be read.\n"
+        "Exit status 0: all scenes are valid; 2: at least one is not; 3: at least one cannot be read, or a file that it\n"
+        "names.\n"
         "\n"
         "Examples:\n"
         "  nephos validate scenes/*.toml\n"

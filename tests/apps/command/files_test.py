@@ -122,7 +122,7 @@ class Files(Case):
         self.assertIn("no.vdb", json.loads(self.call("info", "no.vdb", "--json", status=3).stdout)["error"])
 
     def test_a_checkpoint_that_lies_about_its_size(self):
-        head = b"NEPHOSCP" + struct.pack("<II", 1, 1) + b"a" * 32 + bytes(24)
+        head = b"NEPHOSCP" + struct.pack("<II", 1, 2) + b"a" * 32 + bytes(24)
         for name, sizes in (("state", [1 << 62]), ("history", [8, 1 << 62]), ("sum", [(1 << 64) - 8])):
             content = head
             for size in sizes:
