@@ -86,8 +86,10 @@ HWY_INLINE Floats part_above(const ResolvedNoise& noise, float level) {
 HWY_INLINE Floats probed_noise(std::span<const NoiseOctave> octaves, const Floats3& point, const Footprint& print) {
     constexpr int kProbes = 4;
     const Floats width = hn::Sqrt(hn::MulAdd(print.across_x, print.across_x, hn::Mul(print.across_y, print.across_y)));
-    if (hn::AllTrue(Lanes(), hn::Le(print.longest, hn::Mul(set(1.5f), width))))
-        return resolved_noise(octaves, point, print.longest).value;
+    const auto is_round = hn::Le(print.longest, hn::Mul(set(1.5f), width));
+    Floats at_middle = hn::Zero(Lanes());
+    if (!hn::AllFalse(Lanes(), is_round)) at_middle = resolved_noise(octaves, point, print.longest).value;
+    if (hn::AllTrue(Lanes(), is_round)) return at_middle;
     const Floats size = hn::Max(width, hn::Mul(set(1.0f / kProbes), print.longest));
     Floats sum = hn::Zero(Lanes());
     for (int n = 0; n < kProbes; ++n) {
@@ -95,7 +97,7 @@ HWY_INLINE Floats probed_noise(std::span<const NoiseOctave> octaves, const Float
         const Floats3 probe{hn::MulAdd(part, print.along_x, point.x), hn::MulAdd(part, print.along_y, point.y), point.z};
         sum = hn::Add(sum, resolved_noise(octaves, probe, size).value);
     }
-    return hn::Mul(set(1.0f / kProbes), sum);
+    return hn::IfThenElse(is_round, at_middle, hn::Mul(set(1.0f / kProbes), sum));
 }
 
 inline constexpr float kWoodLevel = 0.7f;  // above which lies 0.24 of noise of variance 1

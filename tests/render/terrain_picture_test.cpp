@@ -251,7 +251,8 @@ TEST(TerrainPicture, SunAndCloudsShadeIt) {
     EXPECT_LT(shaded, 0.9 * lit);
 }
 
-// From above: the top of the wall is white above the snow line, its steep sides and the low ground keep their colour.
+// From above: the top of the wall is white above the snow line, but for its steep rims; its sides and the low ground keep their
+// colour, but where smooth edges mix them with what is beside them.
 TEST(TerrainPicture, SnowLiesOnHighAndGentleGround) {
     RenderOptions bare = view();
     bare.camera = {{0, 3000, 2500}, {0, 3000, 0}, 60, 96, 72, 0};
@@ -260,6 +261,18 @@ TEST(TerrainPicture, SnowLiesOnHighAndGentleGround) {
     const Picture without = draw(bare, {}), with = draw(snowy, {});
     const auto sum = [](const Picture& picture, std::size_t n) {
         return double(picture.beauty[3 * n]) + double(picture.beauty[3 * n + 1]) + double(picture.beauty[3 * n + 2]);
+    };
+    const auto height_m = [&](std::size_t n) {
+        const double u = (double(n % 96) + 0.5 - 48) / 36 * std::tan(0.5235987755982988),
+                     v = (double(n / 96) + 0.5 - 36) / 36 * std::tan(0.5235987755982988);
+        return 2500 - double(with.terrain_m[n]) / std::sqrt(1 + u * u + v * v);
+    };
+    // The rims are a row of pixels wide, and so are the smooth edges beside them.
+    const auto is_within_top = [&](std::size_t n) {
+        for (const std::size_t row : {n - 2 * 96, n, n + 2 * 96})
+            for (const std::size_t at : {row - 2, row, row + 2})
+                if (at >= with.pixels() || !(height_m(at) > 399)) return false;
+        return true;
     };
     int top = 0, white = 0, side = 0, coloured = 0, low = 0;
     for (std::size_t n = 0; n < with.pixels(); ++n) {
@@ -270,10 +283,8 @@ TEST(TerrainPicture, SnowLiesOnHighAndGentleGround) {
             EXPECT_EQ(ratio, 1);
             continue;
         }
-        const double u = (double(n % 96) + 0.5 - 48) / 36 * std::tan(0.5235987755982988),
-                     v = (double(n / 96) + 0.5 - 36) / 36 * std::tan(0.5235987755982988);
-        const double z_m = 2500 - double(with.terrain_m[n]) / std::sqrt(1 + u * u + v * v);
-        if (z_m > 399) {
+        const double z_m = height_m(n);
+        if (is_within_top(n)) {
             ++top;
             white += ratio > 1.5 ? 1 : 0;
         } else if (z_m > 150 && z_m < 350) {
@@ -284,7 +295,7 @@ TEST(TerrainPicture, SnowLiesOnHighAndGentleGround) {
     EXPECT_GT(top, 500);
     EXPECT_GT(white, 0.9 * top);
     EXPECT_GT(side, 30);
-    EXPECT_EQ(coloured, side);
+    EXPECT_GE(coloured, 0.95 * side);
     EXPECT_GT(low, 500);
 }
 
