@@ -120,14 +120,14 @@ void Automaton::Impl::draw_initial_state() {
     const BlockField field = field_now();
     if (!field.anything()) return;
     const StepPlanes planes = planes_of(lattice.act);
-    const StepRandom random{options.seed, 0, &field, &ladder};
-    for_parts([&](int bz, int begin, int end) { draw_initial_part(planes, random, bz, begin, end); });
+    const StepRandom random{options.seed, Domain::initial_state, 0, &field, &ladder};
+    for_parts([&](int bz, int begin, int end) { bear_part(planes, random, bz, begin, end); });
 }
 
 void Automaton::Impl::grow_and_draw() {
     const BlockField field = field_now();
     const StepPlanes planes = planes_of(act_next);
-    const StepRandom random{options.seed, std::uint32_t(steps), &field, &ladder};
+    const StepRandom random{options.seed, Domain::lattice, std::uint32_t(steps), &field, &ladder};
     for_parts([&](int bz, int begin, int end) { step_part(planes, random, bz, begin, end); });
     std::swap(lattice.act, act_next);
 }

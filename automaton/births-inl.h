@@ -117,7 +117,6 @@ inline BirthScratch& scratch_of_thread() {
     // Tables are those of a ladder, a seed and a slab.
     for (UniformBirths& births : scratch->uniform) births.level = -1;
     for (auto& table : scratch->dense_tables) table.reset();
-    scratch->initial_table.reset();
     empty_queues(*scratch);
     return *scratch;
 }

@@ -154,8 +154,8 @@ inline const CellBits& cloud_of_block(const Segment& g, int block, BirthScratch&
     return s.cloud[block];
 }
 
-// Applies a draw's events of all blocks of the segment to its plane.
-inline HWY_NOINLINE void apply_bits(const Segment& g, int draw, const CellBits* events, BitOrder order) {
+// Applies a draw's events of all blocks of the segment, in the order of words, to its plane.
+inline HWY_NOINLINE void apply_bits(const Segment& g, int draw, const CellBits* events) {
     const WordLanes d;
     const int words = (g.blocks + 7) / 8;
     const auto of_segment = hn::FirstN(d, std::size_t(words));
@@ -177,7 +177,7 @@ inline HWY_NOINLINE void apply_bits(const Segment& g, int draw, const CellBits* 
         for (int word = 0; word < 8; ++word) v[word] = word < words ? hn::Load(d, mirrored[word][n]) : hn::Zero(d);
         transpose_words(v);
         for (int lane = 0; lane < 8; ++lane) {
-            const int row = row_of(order, lane / 2 * 2 + n / 4, n % 4 * 2 + lane % 2);
+            const int row = row_of(BitOrder::words, lane / 2 * 2 + n / 4, n % 4 * 2 + lane % 2);
             const std::ptrdiff_t at = g.row_word[std::size_t(row)];
             if (at < 0) continue;
             const auto cells = hn::MaskedLoad(of_segment, d, plane + at), happens = hn::And(v[lane], valid);
@@ -222,8 +222,8 @@ inline const CellBits& cloud_of_block(const Segment& g, int block, BirthScratch&
     return s.cloud[block];
 }
 
-// Applies a draw's events of all blocks of the segment to its plane.
-inline HWY_NOINLINE void apply_bits(const Segment& g, int draw, const CellBits* events, BitOrder order) {
+// Applies a draw's events of all blocks of the segment, in the order of words, to its plane.
+inline HWY_NOINLINE void apply_bits(const Segment& g, int draw, const CellBits* events) {
     const int last_word = (g.blocks + 7) / 8 - 1;
     const int cells_left = g.planes.extent.x - (g.bx0 + 8 * last_word) * kBlockEdge;
     const std::uint64_t last = cells_left >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << cells_left) - 1;
@@ -233,7 +233,7 @@ inline HWY_NOINLINE void apply_bits(const Segment& g, int draw, const CellBits* 
         alignas(64) CellBits rows[8];
         mirror_bytes(events + 8 * word, rows);
         for (int n = 0; n < 64; ++n) {
-            const std::ptrdiff_t at = g.row_word[std::size_t(row_of(order, n / 8, n % 8))];
+            const std::ptrdiff_t at = g.row_word[std::size_t(row_of(BitOrder::words, n / 8, n % 8))];
             if (at < 0) continue;
             std::uint64_t& cells = plane[at + g.bx0 / 8 + word];
             const std::uint64_t happens = rows[n % 8][n / 8] & valid;

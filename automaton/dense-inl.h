@@ -123,7 +123,7 @@ HWY_INLINE void compare_jobs(const Segment& g, int draw, std::span<const PhiloxJ
                     const PhiloxJob job = jobs[std::size_t(n)];
                     const ByteBits first = compare_bytes(d, words01, top(d, n, 0, i)),
                                    second = compare_bytes(d, words23, top(d, n, 1, i));
-                    std::uint64_t* const events = s.events[0][job.block] + 2 * job.quarter;
+                    std::uint64_t* const events = s.events[job.block] + 2 * job.quarter;
                     std::uint64_t* const ties = s.ties[job.block] + 2 * job.quarter;
                     const int shift = 8 * i;
                     events[0] = shift == 0 ? first.less : events[0] | first.less << shift;
@@ -180,14 +180,14 @@ inline void add_jobs(std::uint8_t block, const CellBits* cloud, PhiloxJob* jobs,
 // Makes a draw in the blocks in `blocks`, dense in each, and applies it.
 inline void run_dense(const Segment& g, int draw, std::span<const std::uint8_t> blocks, BirthScratch& s) {
     if (blocks.empty()) return;
-    fill_bits(s.events[0], kSegmentBlocks, 0);
+    fill_bits(s.events, kSegmentBlocks, 0);
     int uniform = 0, varying = 0, undecided = 0;
     for (const std::uint8_t block : blocks) {
         fill_bits(s.ties + block, 1, 0);
         const BlockPlan& plan = s.plans[block];
         const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
         if (draw_plan.kind == DrawPlan::Kind::certain) {
-            fill_bits(s.events[0] + block, 1, ~std::uint64_t{0});
+            fill_bits(s.events + block, 1, ~std::uint64_t{0});
             continue;
         }
         if ((s.known_philox >> block & 1) == 0) s.philox_blocks[block] = PhiloxBlock(g.batch(), g.block_word(block));
@@ -214,7 +214,7 @@ inline void run_dense(const Segment& g, int draw, std::span<const std::uint8_t> 
     compare_varying(g, draw, varying, s);
     run_undecided(g, draw, undecided, s);
     run_ties(g, draw, blocks, s);
-    apply_bits(g, draw, s.events[0], BitOrder::words);
+    apply_bits(g, draw, s.events);
 }
 
 }  // namespace nephos::HWY_NAMESPACE

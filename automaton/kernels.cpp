@@ -12,7 +12,6 @@
 #include "automaton/births-inl.h"
 #include "automaton/ellipsoid_row-inl.h"
 #include "automaton/growth-inl.h"
-#include "automaton/initial-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
@@ -37,9 +36,8 @@ void step_part_target(const StepPlanes& planes, const StepRandom& random, int bz
     if (!quiet) draw_part(planes, random, bz, by_begin, by_end, draw_segment);
 }
 
-void draw_initial_part_target(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin,
-                              int by_end) {
-    draw_part(planes, random, bz, by_begin, by_end, draw_initial_segment);
+void bear_part_target(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
+    draw_part(planes, random, bz, by_begin, by_end, draw_segment);
 }
 
 const char* target_name() { return hwy::TargetName(HWY_TARGET); }
@@ -51,7 +49,7 @@ HWY_AFTER_NAMESPACE();
 namespace nephos {
 
 HWY_EXPORT(step_part_target);
-HWY_EXPORT(draw_initial_part_target);
+HWY_EXPORT(bear_part_target);
 HWY_EXPORT(find_in_row_target);
 HWY_EXPORT(target_name);
 
@@ -59,8 +57,8 @@ void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int b
     HWY_DYNAMIC_DISPATCH(step_part_target)(planes, random, bz, by_begin, by_end);
 }
 
-void draw_initial_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
-    HWY_DYNAMIC_DISPATCH(draw_initial_part_target)(planes, random, bz, by_begin, by_end);
+void bear_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
+    HWY_DYNAMIC_DISPATCH(bear_part_target)(planes, random, bz, by_begin, by_end);
 }
 
 void find_in_row(const FieldEllipsoid& e, const BlockEllipsoid& seen, double dy, int bx,

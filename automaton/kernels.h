@@ -14,6 +14,7 @@
 #include "automaton/block_field.h"
 #include "automaton/lattice.h"
 #include "automaton/poisson.h"
+#include "core/random.h"
 
 namespace nephos {
 
@@ -52,9 +53,10 @@ inline bool is_sparse_extinction(const DrawPlan& plan, int cloud) {
     return plan.p_max < kVaryingSparseLimit && plan.p_max * float(cloud) < limit;
 }
 
-// The random numbers and probabilities of one step.
+// The random numbers and probabilities of one step, or of the first state.
 struct StepRandom {
     std::uint64_t seed = 0;
+    Domain domain = Domain::lattice;
     std::uint32_t step = 0;
     const BlockField* field = nullptr;
     const PoissonLadder* ladder = nullptr;
@@ -64,8 +66,9 @@ struct StepRandom {
 // may be cut by the extent.
 void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end);
 
-// Draws the first hum and act, into planes.hum and planes.act_next, of the same part of an empty lattice.
-void draw_initial_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end);
+// Draws the births of the same part without growth: of an empty lattice its first hum and act, into planes.hum and
+// planes.act_next.
+void bear_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end);
 
 // Returns the name of the instruction set in use, for tests and reports.
 const char* kernel_target();

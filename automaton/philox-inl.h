@@ -303,41 +303,6 @@ HWY_INLINE void philox_jobs(const PhiloxBatch& batch, const PhiloxTable<kMax>& t
 #endif
 }
 
-// Calls finish(c, first, second) for 64 cells of a block, a vector of 32 bits at a time: of cell c the words 0 and 1, or where c
-// is odd 2 and 3, of sub-index place + c / 2.
-template <int kMax, class Finish>
-HWY_INLINE void philox_pairs(const PhiloxBatch& batch, const PhiloxTable<kMax>& table, const PhiloxBlock& block, int place,
-                             const Finish& finish) {
-#if HWY_TARGET == HWY_SCALAR
-    const hn::CappedTag<std::uint32_t, 16> d32;
-    for (int c = 0; c < 64; ++c) {
-        const auto sub = std::uint32_t(place + c / 2);
-        const PhiloxWords x = philox_of(batch, pack_counter(block_word_0(table.draw, sub), block.word2));
-        finish(c, hn::Set(d32, x[std::size_t(c % 2 * 2)]), hn::Set(d32, x[std::size_t(c % 2 * 2 + 1)]));
-    }
-#else
-    using D = hn::CappedTag<std::uint64_t, 8>;
-    const D d;
-    const hn::Repartition<std::uint32_t, D> d32;
-    constexpr int kLanes = int(hn::MaxLanes(d));
-    const auto end = [&](int sub, const PhiloxState<D>& x) HWY_ATTR {
-        finish(2 * sub, hn::BitCast(d32, alternate(d, x.w0, x.w2)), hn::BitCast(d32, alternate(d, x.w1, x.w3)));
-    };
-#if HWY_TARGET <= HWY_AVX3
-    constexpr int kAtATime = 4;
-#else
-    constexpr int kAtATime = 2;
-#endif
-    for (int sub = 0; sub < 32; sub += kAtATime * kLanes) {
-        PhiloxState<D> x[kAtATime];
-        for (int n = 0; n < kAtATime; ++n) x[n] = start_at(d, table, block, place + sub + n * kLanes);
-        for (std::size_t round = 2; round < 10; ++round)
-            for (int n = 0; n < kAtATime; ++n) philox_round(d, batch.keys, round, x[n]);
-        for (int n = 0; n < kAtATime; ++n) end(sub + n * kLanes, x[n]);
-    }
-#endif
-}
-
 }  // namespace nephos::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif

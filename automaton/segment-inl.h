@@ -85,7 +85,7 @@ constexpr int row_of(BitOrder order, int word, int byte) {
 
 // Memory of one thread.
 struct BirthScratch {
-    alignas(64) CellBits events[2][kSegmentBlocks];  // of the dense draw at hand; of hum and act in the first state
+    alignas(64) CellBits events[kSegmentBlocks];     // of the dense draw at hand
     alignas(64) CellBits ties[kSegmentBlocks];       // cells whose byte equals the top byte of their threshold
     alignas(64) CellBits cloud[kSegmentBlocks];      // cells that are cld, see cloud_of_block()
     int cloud_cells[kSegmentBlocks];                  // of `cloud`, in blocks that draw extinctions
@@ -106,8 +106,7 @@ struct BirthScratch {
     float rate_bounds[3][kSegmentBlocks];                   // of each draw: sparse_rate_bound()
     UniformBirths uniform[4];                               // by the draws, a bit each
     float uniform_ext = 0, uniform_ext_rate = 0;            // the last p_ext that was the same in a block, and its rate
-    std::optional<PhiloxTable<32>> dense_tables[3];         // of the random bytes of each draw
-    std::optional<PhiloxTable<kBlockCells / 2>> initial_table;  // of the first state
+    std::optional<PhiloxTable<32>> dense_tables[3];  // of the random bytes of each draw
     SparseJob jobs[kSegmentBlocks];
     int job_count = 0, counter_count = 0;
     // The dense draw at hand: quarters of blocks where p is the same in all cells; where it varies and is computed in all
@@ -137,7 +136,7 @@ struct Segment {
     std::array<std::ptrdiff_t, 64> row_word{};  // first word of cell row y + 8 z; -1 outside
 
     PhiloxBatch batch() const {
-        return {keys, random.step, std::uint32_t(bz) | std::uint32_t(Domain::lattice) << 16};
+        return {keys, random.step, std::uint32_t(bz) | std::uint32_t(random.domain) << 16};
     }
     // Word 2 of the block's counters.
     std::uint32_t block_word(int block) const { return std::uint32_t(bx0 + block) | std::uint32_t(by) << 16; }

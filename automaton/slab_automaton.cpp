@@ -126,15 +126,15 @@ struct SlabAutomaton::Impl {
 void SlabAutomaton::Impl::draw_initial_state() {
     const BlockField field = field_now();
     if (!field.anything()) return;
-    const StepRandom random{options.seed, 0, &field, &ladder};
+    const StepRandom random{options.seed, Domain::initial_state, 0, &field, &ladder};
     const StepPlanes p = planes();
-    for_rows_of_blocks([&](int bz, int by) { draw_initial_part(p, random, bz, by, by + 1); });
+    for_rows_of_blocks([&](int bz, int by) { bear_part(p, random, bz, by, by + 1); });
     publish();
 }
 
 void SlabAutomaton::Impl::grow_and_draw() {
     const BlockField field = field_now();
-    const StepRandom random{options.seed, std::uint32_t(steps), &field, &ladder};
+    const StepRandom random{options.seed, Domain::lattice, std::uint32_t(steps), &field, &ladder};
     const StepPlanes p = planes();
     for_rows_of_blocks([&](int bz, int by) { step_part(p, random, bz, by, by + 1); });
 }

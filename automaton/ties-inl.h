@@ -55,7 +55,7 @@ inline void decide_ties(const Segment& g, int draw, TieBatch& ties, BirthScratch
     for (int n = 0; n < ties.count; ++n) {
         const std::uint32_t at = ties.cells[n];
         const std::uint64_t event = words[4 * std::uint32_t(n) + (at & 3)] >> 8 < ties.below[n];
-        s.events[0][at >> 9][at >> 6 & 7] |= event << (at & 63);
+        s.events[at >> 9][at >> 6 & 7] |= event << (at & 63);
     }
     ties.count = 0;
 }

@@ -151,7 +151,7 @@ inline void decide_cells(const Segment& g, int draw, UndecidedCells& undecided, 
         hn::StoreU(compress(du, below, tie), du, ties.below + ties.count);
         ties.count += int(hn::CountTrue(du, tie));
     }
-    for (int n = 0; n < count; ++n) s.events[0][events[n] >> 9][events[n] >> 6 & 7] |= std::uint64_t{1} << (events[n] & 63);
+    for (int n = 0; n < count; ++n) s.events[events[n] >> 9][events[n] >> 6 & 7] |= std::uint64_t{1} << (events[n] & 63);
     undecided.count = 0;
 }
 
@@ -173,7 +173,7 @@ inline void run_undecided(const Segment& g, int draw, int count, BirthScratch& s
         const auto store = [&](int n, int word, int i, auto bytes, std::uint64_t low, std::uint64_t high) HWY_ATTR {
             hn::StoreU(bytes, d, reinterpret_cast<std::uint64_t*>(random[n][word]) + i);
             const ByteBits events = compare_bytes(d, bytes, hn::Set(d, low)), above = compare_bytes(d, bytes, hn::Set(d, high));
-            std::uint64_t& event = s.events[0][jobs[n].block][2 * jobs[n].quarter + word];
+            std::uint64_t& event = s.events[jobs[n].block][2 * jobs[n].quarter + word];
             std::uint64_t& left = s.ties[jobs[n].block][2 * jobs[n].quarter + word];
             const std::uint64_t between = ~events.less & (above.less | above.tie);
             const std::uint64_t lanes = hn::Lanes(d) == 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * hn::Lanes(d)) - 1;

@@ -37,7 +37,7 @@ struct Part {
                       .act_next = act.words().data(),
                       .hum = hum.words().data(),
                       .cld = cld.words().data()};
-    StepRandom random{options.seed, 3, &field, &ladder};
+    StepRandom random{options.seed, Domain::lattice, 3, &field, &ladder};
 
     Part() {
         for (int k = 0; k < 8; ++k)
@@ -59,7 +59,7 @@ TEST(BirthScratch, IsEmptyAfterAPartThatFailed) {
         s.job_count = target::kSegmentBlocks;
         s.counter_count = target::kMaxCounters;
         s.accepted_count = 7;
-        std::fill_n(&s.events[0][0][0], 8 * target::kSegmentBlocks, ~std::uint64_t{0});
+        std::fill_n(&s.events[0][0], 8 * target::kSegmentBlocks, ~std::uint64_t{0});
         std::fill_n(&s.ties[0][0], 8 * target::kSegmentBlocks, ~std::uint64_t{0});
         s.known_cloud = ~0u;
         throw std::bad_alloc();

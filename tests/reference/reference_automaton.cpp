@@ -27,9 +27,9 @@ std::uint8_t at(const std::vector<std::uint8_t>& plane, const Extent& e, const B
     return plane[linear_index(e, i, j, k)];
 }
 
-// The random 32-bit word `word` of counter (draw, step, block, sub): docs/adr/0002 in one line.
-std::uint32_t random_word(std::uint64_t seed, std::uint32_t draw, std::uint32_t step, int bx, int by, int bz,
-                          std::uint32_t sub, std::uint32_t word, std::uint32_t domain = 0) {
+// The random 32-bit word `word` of counter (draw, domain, step, block, sub): docs/adr/0002 in one line.
+std::uint32_t random_word(std::uint64_t seed, std::uint32_t draw, std::uint32_t domain, std::uint32_t step, int bx,
+                          int by, int bz, std::uint32_t sub, std::uint32_t word) {
     const r123::Philox4x32::ctr_type counter = {{sub + draw * 65536u + 2u * 16777216u, step,
                                                  std::uint32_t(bx + by * 65536), std::uint32_t(bz) + domain * 65536u}};
     const r123::Philox4x32::key_type key = {{std::uint32_t(seed & 0xFFFFFFFFu), std::uint32_t(seed >> 32)}};
@@ -40,12 +40,12 @@ std::uint32_t random_word(std::uint64_t seed, std::uint32_t draw, std::uint32_t 
 struct BlockDraws {
     const AutomatonOptions& options;
     const BlockField& field;
-    std::uint32_t step;
+    std::uint32_t domain, step;
     int bx, by, bz;
     BlockPlan plan;
 
     std::uint32_t word(std::uint32_t draw_id, std::uint32_t sub, std::uint32_t n) const {
-        return random_word(options.seed, draw_id, step, bx, by, bz, sub, n);
+        return random_word(options.seed, draw_id, domain, step, bx, by, bz, sub, n);
     }
     float p(int draw, int cell) const {
         const float value = probability_at(plan, draw, cell % 8, cell / 8 % 8, cell / 64);
@@ -170,34 +170,6 @@ Lattice to_lattice(const Cells& cells) {
     return lattice;
 }
 
-Cells first_state(const AutomatonOptions& options, const std::vector<ActiveEllipsoid>& ellipsoids) {
-    const Background background(options);
-    const BlockField field(options, ellipsoids, background);
-    const Extent e = options.extent;
-    Cells cells = to_cells(BitPlane(e).view(), BitPlane(e).view(), BitPlane(e).view());
-    std::vector<const FieldEllipsoid*> row;
-    BlockPlan plan;
-    for (int k = 0; k < e.z; ++k) {
-        for (int j = 0; j < e.y; ++j) {
-            for (int i = 0; i < e.x; ++i) {
-                field.collect(j / 8, k / 8, row);
-                field.plan_blocks(i / 8, j / 8, k / 8, row, std::span(&plan, 1));
-                const std::uint32_t cell = std::uint32_t(i % 8 + j % 8 * 8 + k % 8 * 64);
-                const auto happens = [&](int draw) {
-                    const std::uint32_t t = probability_threshold(probability_at(plan, draw, i % 8, j % 8, k % 8));
-                    const std::uint32_t word = random_word(options.seed, 0, 0, i / 8, j / 8, k / 8, cell / 2,
-                                                           cell % 2 * 2 + std::uint32_t(draw), 1);
-                    return t == kCertain || word < t;
-                };
-                const std::size_t n = linear_index(e, i, j, k);
-                cells.hum[n] = happens(kHum);
-                cells.act[n] = happens(kAct);
-            }
-        }
-    }
-    return cells;
-}
-
 Cells grow(const Cells& now, const Boundaries& b) {
     Cells next = now;
     const Extent e = now.extent;
@@ -220,8 +192,10 @@ Cells grow(const Cells& now, const Boundaries& b) {
     return next;
 }
 
-void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uint32_t step,
-                         const std::vector<ActiveEllipsoid>& ellipsoids) {
+namespace {
+
+void draw(Cells& cells, const AutomatonOptions& options, std::uint32_t domain, std::uint32_t step,
+          const std::vector<ActiveEllipsoid>& ellipsoids) {
     Background background(options);
     background.set_time(options, double(step) * options.time_step_s);
     const BlockField field(options, ellipsoids, background);
@@ -232,7 +206,7 @@ void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uin
             std::vector<const FieldEllipsoid*> row;
             field.collect(by, bz, row);
             for (int bx = 0; bx * 8 < e.x; ++bx) {
-                BlockDraws b{options, field, step, bx, by, bz, {}};
+                BlockDraws b{options, field, domain, step, bx, by, bz, {}};
                 field.plan_blocks(bx, by, bz, row, std::span(&b.plan, 1));
                 std::vector<std::pair<int, std::size_t>> inside;  // cell of the block, cell of the lattice
                 std::vector<int> cloud;
@@ -251,6 +225,20 @@ void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uin
             }
         }
     }
+}
+
+}  // namespace
+
+Cells first_state(const AutomatonOptions& options, const std::vector<ActiveEllipsoid>& ellipsoids) {
+    const BitPlane none(options.extent);
+    Cells cells = to_cells(none.view(), none.view(), none.view());
+    draw(cells, options, 1, 0, ellipsoids);
+    return cells;
+}
+
+void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uint32_t step,
+                         const std::vector<ActiveEllipsoid>& ellipsoids) {
+    draw(cells, options, 0, step, ellipsoids);
 }
 
 void advect_layer(Cells& cells, const Boundaries& b, int k, std::int64_t dx, std::int64_t dy) {

@@ -24,7 +24,7 @@ struct Cells {
 Cells to_cells(BitPlaneView hum, BitPlaneView act, BitPlaneView cld);
 Lattice to_lattice(const Cells& cells);
 
-// The first state, drawn with the ellipsoids of time 0.
+// The first state: births on the empty lattice, with the ellipsoids of time 0.
 Cells first_state(const AutomatonOptions& options, const std::vector<ActiveEllipsoid>& ellipsoids);
 
 // Growth alone (D, after Nagel).

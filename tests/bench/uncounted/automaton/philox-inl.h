@@ -91,16 +91,6 @@ HWY_INLINE void philox_jobs(const PhiloxBatch&, const PhiloxTable<kMax>&, const 
     }
 }
 
-template <int kMax, class Finish>
-HWY_INLINE void philox_pairs(const PhiloxBatch&, const PhiloxTable<kMax>&, const PhiloxBlock&, int, const Finish& finish) {
-    const hn::CappedTag<std::uint32_t, 16> d;
-    HWY_ALIGN std::uint64_t words[64];
-    uncounted_words(32, words);
-    const auto* const of_cells = reinterpret_cast<const std::uint32_t*>(words);
-    for (std::size_t c = 0; c < 64; c += hn::Lanes(d))
-        finish(int(c), hn::Load(d, of_cells + c), hn::Load(d, of_cells + 64 + c));
-}
-
 }  // namespace nephos::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif
