@@ -166,7 +166,7 @@ void SkySimulation::step() {
     const std::size_t before = count();
     retire_clouds();
     ++steps_;
-    if (options_.entering == Entering::horizon) {
+    if (options_.entering == Entering::horizon && !options_.periodic) {
         let_enter();
     } else {
         adjust_number(before - count());
