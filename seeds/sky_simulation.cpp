@@ -110,10 +110,10 @@ CloudForms SkySimulation::forms(const SkyCloud& cloud, double state) const {
 
 Vec3 SkySimulation::lean_m(const SkyCloud& cloud, const CloudForm& form, double height_m, double time_s) const {
     if (options_.shear_s == 0) return {};
-    const double centre_m = cloud.base_m + shapes_[form.shape].cloud.centre_m.z;
-    const Velocity there = wind_at(options_.wind, height_m, time_s), middle = wind_at(options_.wind, centre_m, time_s);
-    return {options_.shear_s * (there.east_m_per_s - middle.east_m_per_s),
-            options_.shear_s * (there.north_m_per_s - middle.north_m_per_s), 0};
+    const Vec3 centre_m = position_m(cloud) + shapes_[form.shape].cloud.centre_m;
+    const Vec3 there = wind_at(options_.wind, Vec3(centre_m.x, centre_m.y, height_m), time_s),
+               middle = wind_at(options_.wind, centre_m, time_s);
+    return {options_.shear_s * (there.x - middle.x), options_.shear_s * (there.y - middle.y), 0};
 }
 
 std::size_t SkySimulation::count() const {
@@ -166,7 +166,7 @@ void SkySimulation::step() {
     const std::size_t before = count();
     retire_clouds();
     ++steps_;
-    if (options_.entering == Entering::horizon) {
+    if (options_.entering == Entering::horizon && !options_.periodic) {
         let_enter();
     } else {
         adjust_number(before - count());

@@ -116,7 +116,7 @@ class SkySimulation {
     CloudForms forms(const SkyCloud& cloud, double state) const;
     CloudForms forms(const SkyCloud& cloud) const { return forms(cloud, state()); }
     double state_at(double time_s) const;  // of the atmosphere, by the schedule
-    // Returns how far billboards at a height of a cloud lean at a time, metres east and north (SkyOptions::shear_s).
+    // Returns how far billboards at a height of a cloud lean by profile and fields (SkyOptions::shear_s), m east and north.
     Vec3 lean_m(const SkyCloud& cloud, const CloudForm& form, double height_m, double time_s) const;
     Vec3 position_m(const SkyCloud& cloud) const;  // world position of the model's origin
     Sphere sphere(const SkyCloud& cloud) const;    // around the cloud, in the world

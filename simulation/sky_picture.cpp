@@ -23,13 +23,15 @@ namespace {
 
 constexpr double kLeastFlash = 1.0 / 512;  // relative to the sun; less does not show
 
-double fastest_m_per_s(const Wind& wind) {
-    double fastest = 0;
-    for (const WindKeyframe& key : wind.keyframes)
-        for (const WindLevel& level : key.levels)
-            fastest =
-                std::max(fastest, std::hypot(level.velocity.east_m_per_s, level.velocity.north_m_per_s));
-    return fastest;
+// Returns how far the shear displaces any of a cloud's billboards.
+double farthest_lean_m(const SkySimulation& sky, const SkyCloud& cloud, const CloudForm& form,
+                       std::span<const Billboard> billboards, double time_s) {
+    double farthest = 0;
+    if (sky.options().shear_s == 0) return farthest;
+    const double base_m = sky.position_m(cloud).z;
+    for (const Billboard& billboard : billboards)
+        farthest = std::max(farthest, length(sky.lean_m(cloud, form, billboard.centre_m.z + base_m, time_s)));
+    return farthest;
 }
 
 constexpr double kLeastLeft = 1e-30;  // of the light, so that depths stay finite
@@ -192,12 +194,13 @@ std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyC
     const CameraFrame camera = camera_frame(options.camera),
                       mirror = camera_frame(mirrored.value_or(options.camera));
     const Frustum frustum(camera), below(mirror);
-    const double lean_m = 2 * sky.options().shear_s * fastest_m_per_s(sky.options().wind);
     std::vector<FormedCloud> seen, unseen;
     for (const FormedCloud& each : formed) {
         const Cloud& shape = sky.shapes()[each.form.shape].cloud;
         const Vec3 centre_m = sky.position_m(*each.cloud) + shape.centre_m;
-        const double radius_m = shape.radius_m + scattered(sky, each.form).reach_m + lean_m;
+        const ScatteredBillboards& what = scattered(sky, each.form);
+        const double lean_m = farthest_lean_m(sky, *each.cloud, each.form, what.billboards, time_s),
+                     radius_m = shape.radius_m + what.reach_m + lean_m;
         const bool is_seen = !cull || frustum.may_see(centre_m - camera.position_m, radius_m) ||
                              below.may_see(centre_m - mirror.position_m, radius_m);
         (is_seen ? seen : unseen).push_back(each);

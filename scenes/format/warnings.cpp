@@ -158,14 +158,17 @@ void add_terrain_keys(const TerrainOptions& terrain, std::vector<std::string>& t
             "`cells`, `feature_m` and `seed` of [terrain] have no effect: they are of `ground.relief`");
 }
 
-// Keys of a layer that is drawn directly.
-void add_direct_keys(const LayerOptions& layer, std::vector<std::string>& to) {
+// Keys of a layer that is drawn directly. What it has from [field] is not its own.
+void add_direct_keys(const FieldOptions& shared, const LayerOptions& layer, std::vector<std::string>& to) {
     const auto add = [&](const char* keys) {
         to.push_back(
             fmt::format("layer '{}' is drawn directly: {} no effect without `automaton`", layer.name, keys));
     };
     if (layer.light_absorption != 1) add("`light_absorption` has");
-    const bool field = !layer.scatters.empty() || !layer.ellipsoids.empty() || !layer.profile.empty();
+    if (!(layer.background == shared.background)) add("`background` has");
+    if (layer.own_detail && !(layer.detail == DetailOptions{})) add("[layer.detail] has");
+    const bool profile = !layer.profile.empty() && layer.profile != shared.profile;
+    const bool field = !layer.scatters.empty() || !layer.ellipsoids.empty() || profile;
     CouplingOptions plain;
     if (layer.coupling.min_semi_axis_m == layer.placement.cell_size_m)  // its default
         plain.min_semi_axis_m = layer.coupling.min_semi_axis_m;
@@ -173,17 +176,18 @@ void add_direct_keys(const LayerOptions& layer, std::vector<std::string>& to) {
         add("its ellipsoids, scatters, profile and coupling have");
 }
 
-// Whether there is any wind, at any time.
+// Whether the profile of the wind, which brings clouds into the world, blows at any time.
 bool blows(const Wind& wind) {
-    return !wind.fields.empty() || std::ranges::any_of(wind.keyframes, [](const WindKeyframe& keyframe) {
+    return std::ranges::any_of(wind.keyframes, [](const WindKeyframe& keyframe) {
         return std::ranges::any_of(keyframe.levels, [](const WindLevel& level) {
             return level.velocity.east_m_per_s != 0 || level.velocity.north_m_per_s != 0;
         });
     });
 }
 
-// The constant background where a profile or a grid is in its place.
+// The constant background of automata where a profile or a grid is in its place.
 void add_background(const Scene& scene, std::vector<std::string>& to) {
+    if (!scene.layers.empty() && std::ranges::none_of(scene.layers, &LayerOptions::automaton)) return;
     const FieldOptions& field = scene.automaton.field;
     const Probabilities& constant = field.background;
     const Probabilities plain = FieldOptions{}.background;
@@ -205,14 +209,141 @@ void add_background(const Scene& scene, std::vector<std::string>& to) {
                                      layer.name));
 }
 
+// How the number of clouds follows the state, where it cannot follow over the horizon.
+void add_entering(const Scene& scene, std::size_t n, std::vector<std::string>& to) {
+    const LayerOptions& layer = scene.layers[n];
+    if (layer.entering != Entering::horizon) return;
+    const Wind& wind = layer_wind(scene, n);
+    if (scene.tile)
+        to.push_back(fmt::format(
+            "layer '{}': `entering` has no effect: in a `tile` no cloud leaves, and new ones form inside", layer.name));
+    else if (!blows(wind) && wind.fields.empty())
+        to.push_back(fmt::format(
+            "layer '{}': no cloud will ever enter or leave: `entering` is \"horizon\", and there is no wind", layer.name));
+    else if (!blows(wind))
+        to.push_back(fmt::format(
+            "layer '{}': no cloud will ever enter: `entering` is \"horizon\", and only the profile [[wind]] brings "
+            "clouds, not [[wind_field]]",
+            layer.name));
+}
+
+// Sections of automata and of density, where no layer has any.
+void add_sections_of_automata(const Scene& scene, std::vector<std::string>& to) {
+    const bool grows = scene.layers.empty() ||
+                       std::ranges::any_of(scene.layers, [](const LayerOptions& layer) { return layer.automaton; });
+    if (grows) return;
+    if (!(scene.automaton.field == FieldOptions{})) to.emplace_back("[field] has no effect: no layer has an automaton");
+    if (!(scene.density.detail == DetailOptions{})) to.emplace_back("[detail] has no effect: no layer has an automaton");
+    if (has_density(scene)) return;
+    DensityOptions density = scene.density;
+    density.detail = {};
+    if (!(density == DensityOptions{} && scene.density_files == DensityFileOptions{}))
+        to.emplace_back("[density] has no effect: all layers are drawn directly");
+}
+
+// Whether a layer's bases are at the heights of a genus in the region, as far as they lie in its lattice.
+bool has_heights_of_genus(const Scene& scene, const LayerOptions& layer) {
+    const double ground_m = scene.render.ground.height_m, bottom_m = layer.placement.origin_m.z,
+                 top_m = bottom_m + layer.extent.z * layer.placement.cell_size_m;
+    return std::ranges::any_of(genera(), [&](const GenusFacts& facts) {
+        const Range above_ground = base_height_m(facts.genus, scene.climate.region);
+        Range heights{above_ground.min + ground_m, above_ground.max + ground_m};
+        if (layer.automaton) heights = {std::max(heights.min, bottom_m), std::min(heights.max, top_m)};
+        return layer.base_height_m == heights;
+    });
+}
+
 // Keys that are of clouds which the scene has none of.
 void add_keys_of_clouds(const Scene& scene, std::vector<std::string>& to) {
     const bool direct = std::ranges::any_of(
         scene.layers, [](const LayerOptions& layer) { return !layer.is_veil && !layer.automaton; });
+    const bool region = std::ranges::any_of(scene.layers, [&](const LayerOptions& layer) {
+        return !layer.is_veil && has_heights_of_genus(scene, layer);
+    });
+    if (scene.climate.region != ClimateOptions{}.region && !region)
+        to.emplace_back("`climate.region` has no effect: no layer has the heights of a `genus`");
+    const CloudLight& light = scene.render.light;
+    if (light.light_distance_m != CloudLight{}.light_distance_m && light.lighting != Lighting::cfa &&
+        scene.render.lightning.empty())
+        to.emplace_back(
+            "`light.light_distance_m` has no effect: `light.lighting` is not \"cfa\", and there is no [[lightning]]");
     if (scene.render.light.cfa_clouds_per_frame > 0 && !direct)
         to.emplace_back("`light.cfa_clouds_per_frame` has no effect: no layer is drawn directly (`automaton = false`)");
-    if (scene.density.refine != 1 && !has_density(scene))
-        to.emplace_back("`density.refine` has no effect: all layers are drawn directly");
+}
+
+// Keys of a layer of clouds.
+void add_layer_keys(const Scene& scene, std::size_t n, std::vector<std::string>& to) {
+    const LayerOptions& layer = scene.layers[n];
+    if (!layer.automaton) add_direct_keys(scene.automaton.field, layer, to);
+    if (layer.automaton && layer.light_absorption != 1 && layer.light_absorption > 0 && !absorbs_in_voxels(scene, n))
+        to.push_back(fmt::format(
+            "layer '{}': `light_absorption` has no effect: no base model of its clouds has a finite "
+            "`light_distance_m`, or they do not drive the automaton",
+            layer.name));
+    add_entering(scene, n, to);
+    if (layer.automaton && layer.shear_s > 0)
+        to.push_back(fmt::format(
+            "layer '{}': `shear_s` has no effect on the clouds of an automaton, which the wind "
+            "shears itself",
+            layer.name));
+}
+
+// Names of the base models of layers without and with an automaton, and of those that absorb the light in voxels.
+struct UsedModels {
+    std::set<std::string> drawn, grown, absorbing;
+};
+
+UsedModels used_models(const Scene& scene) {
+    UsedModels used;
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        const LayerOptions& layer = scene.layers[n];
+        if (layer.is_veil) continue;
+        const std::set<std::string> models = models_of(scene, layer);
+        (layer.automaton ? used.grown : used.drawn).insert(models.begin(), models.end());
+        if (absorbs_in_voxels(scene, n)) used.absorbing.insert(models.begin(), models.end());
+    }
+    return used;
+}
+
+// Keys of a base model that only billboards have, where it drives automata alone.
+void add_keys_of_billboards(const BaseModel& model, bool absorbs, std::vector<std::string>& to) {
+    if (has_billboards(model))
+        to.push_back(fmt::format(
+            "base model '{}': the numbers, sizes and textures of billboards have no effect: all layers that use it "
+            "have an automaton",
+            model.name));
+    if (std::isfinite(model.light_distance_m) && !absorbs)
+        to.push_back(fmt::format(
+            "base model '{}': `light_distance_m` has no effect: no cloud of it drives an automaton in a layer whose "
+            "`light_absorption` is above 0",
+            model.name));
+}
+
+// Keys of a base model that only automata have, where it is drawn directly alone.
+void add_keys_of_ellipsoids(const BaseModel& model, std::vector<std::string>& to) {
+    const auto add = [&](bool given, const char* key) {
+        if (given)
+            to.push_back(fmt::format("base model '{}': `{}` has no effect: all layers that use it are drawn directly",
+                                     model.name, key));
+    };
+    add(model.own_centre, "centre");
+    add(model.own_rim, "rim");
+    add(std::ranges::any_of(model.seeds, [](const Seed& seed) { return seed.strength != Seed{}.strength; }),
+        "seeds.strength");
+}
+
+void add_model_keys(const Scene& scene, std::vector<std::string>& to) {
+    const UsedModels used = used_models(scene);
+    for (const BaseModel& model : scene.models) {
+        const bool drawn = used.drawn.contains(model.name), grown = used.grown.contains(model.name);
+        if (grown && !drawn) add_keys_of_billboards(model, used.absorbing.contains(model.name), to);
+        if (drawn && !grown) add_keys_of_ellipsoids(model, to);
+        const bool texture = std::ranges::any_of(
+            model.seeds, [](const Seed& seed) { return seed.texture != Seed{}.texture; });
+        if (drawn && texture && !model.textures.empty())
+            to.push_back(fmt::format("base model '{}': `seeds.texture` has no effect: its `textures` are in its place",
+                                     model.name));
+    }
 }
 
 }  // namespace
@@ -231,50 +362,17 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
             "`relief` or `height_map`");
     add_terrain_keys(scene.render.terrain, result);
     add_background(scene, result);
+    add_sections_of_automata(scene, result);
     add_keys_of_clouds(scene, result);
     if (sea && scene.ground_cover.enabled)
         result.emplace_back(
             "[wet_ground] has no effect but for its reflection and the rings of drops (`ripples`): rain and snow vanish "
             "in a ground of water");
-    // Base models of layers without and with an automaton, and of those that absorb the light in voxels.
-    std::set<std::string> drawn, grown, absorbing;
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
-        const LayerOptions& layer = scene.layers[n];
-        if (layer.is_slab) add_slab_keys(layer, result);
-        if (layer.is_veil) continue;
-        const std::set<std::string> models = models_of(scene, layer);
-        (layer.automaton ? grown : drawn).insert(models.begin(), models.end());
-        const bool absorbs = absorbs_in_voxels(scene, n);
-        if (absorbs) absorbing.insert(models.begin(), models.end());
-        if (layer.light_absorption != 1 && layer.automaton && !absorbs && layer.light_absorption > 0)
-            result.push_back(fmt::format(
-                "layer '{}': `light_absorption` has no effect: no base model of its clouds has a finite "
-                "`light_distance_m`, or they do not drive the automaton",
-                layer.name));
-        if (!layer.automaton) add_direct_keys(layer, result);
-        if (layer.entering == Entering::horizon && !blows(layer_wind(scene, n)))
-            result.push_back(fmt::format(
-                "layer '{}': no cloud will ever enter or leave: `entering` is \"horizon\", and there is no wind",
-                layer.name));
-        if (layer.automaton && layer.shear_s > 0)
-            result.push_back(fmt::format(
-                "layer '{}': `shear_s` has no effect on the clouds of an automaton, which the wind "
-                "shears itself",
-                layer.name));
+        if (scene.layers[n].is_slab) add_slab_keys(scene.layers[n], result);
+        if (!scene.layers[n].is_veil) add_layer_keys(scene, n, result);
     }
-    for (const BaseModel& model : scene.models) {
-        if (!grown.contains(model.name) || drawn.contains(model.name)) continue;
-        if (has_billboards(model))
-            result.push_back(fmt::format(
-                "base model '{}': the numbers, sizes and textures of billboards have no effect: all layers that use it "
-                "have an automaton",
-                model.name));
-        if (std::isfinite(model.light_distance_m) && !absorbing.contains(model.name))
-            result.push_back(fmt::format(
-                "base model '{}': `light_distance_m` has no effect: no cloud of it drives an automaton in a layer whose "
-                "`light_absorption` is above 0",
-                model.name));
-    }
+    add_model_keys(scene, result);
     return result;
 }
 

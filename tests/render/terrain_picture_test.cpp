@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -297,6 +298,44 @@ TEST(TerrainPicture, SnowLiesOnHighAndGentleGround) {
     EXPECT_GT(side, 30);
     EXPECT_GE(coloured, 0.95 * side);
     EXPECT_GT(low, 500);
+}
+
+// Level ground of 800 m at one height, seen from above: the bottom of a pit, open ground, and the top of a hill. Below the
+// snow line hollows hold more snow, pixel by pixel, and the wind leaves less on tops.
+TEST(TerrainPicture, SnowLiesInShelter) {
+    constexpr float kGround_m = 400;
+    RenderOptions bare = view();
+    bare.camera = {{0, 3000, 1700}, {0, 3000, 0}, 15, 96, 72, 0};
+    bare.sun.elevation_deg = 80;
+    bare.air.extinction_per_m = {0, 0, 0};
+    RenderOptions snowy = bare;
+    snowy.terrain.snow_line_m = 420;
+    // How much brighter each pixel is with snow, where the ground around stands at a height.
+    const auto brightened = [&](float around_m) {
+        HeightImage image{41, 41, std::vector<float>(41 * 41, around_m)};
+        for (int j = 16; j <= 24; ++j)
+            for (int i = 16; i <= 24; ++i) image.heights[std::size_t(41 * j + i)] = kGround_m;
+        TerrainOptions place;
+        place.y_m = 3000;
+        place.width_m = place.length_m = 4000;
+        place.edge = 0;
+        Splats splats;
+        splats.terrain = std::make_shared<const HeightMap>(height_map(image, place, 0));
+        const Picture without = test::renderer().draw_splats(splats, bare), with = test::renderer().draw_splats(splats, snowy);
+        std::vector<double> ratios;
+        for (std::size_t n = 0; n < with.pixels(); ++n)
+            ratios.push_back(double(with.beauty[3 * n]) / double(without.beauty[3 * n]));
+        return ratios;
+    };
+    const std::vector<double> pit = brightened(800), open = brightened(kGround_m), top = brightened(50);
+    const auto mean = [](const std::vector<double>& of) { return std::reduce(of.begin(), of.end()) / double(of.size()); };
+    for (std::size_t n = 0; n < open.size(); ++n) {
+        EXPECT_GE(pit[n], open[n] - 1e-3) << n;
+        EXPECT_LE(top[n], open[n] + 1e-3) << n;
+    }
+    EXPECT_GT(mean(pit), 1.3 * mean(open));
+    EXPECT_LT(mean(top), 0.9 * mean(open));
+    EXPECT_GT(mean(top), 1);
 }
 
 TEST(TerrainPicture, StandsInTheSeaUpsideDown) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -176,6 +177,43 @@ TEST(ShippedScenes, HaveTheNumbersOfTorchelsen) {
             for (const SkyModel& model : options.skies[s].models) EXPECT_EQ(model.generated, 10);
         }
     }
+}
+
+// The clouds of his figures 29, 31, 33 and 35, drawn directly.
+TEST(ShippedScenes, HaveTheFiguresOfTorchelsen) {
+    struct Row {
+        const char* file;
+        std::size_t models;
+        int generated;
+        std::size_t least_clouds, most_clouds;
+    };
+    const Row rows[] = {{"cirrus", 1, 1, 1, 1},
+                        {"nimbus", 1, 10, 200, 200},
+                        {"rain-clouds", 2, 10, 1001, 1200},
+                        {"fractostratus", 1, 10, 90, 110}};
+    for (const Row& row : rows) {
+        SCOPED_TRACE(row.file);
+        const Scene scene = read_scene(kFolder / "torchelsen" / (std::string(row.file) + ".toml"));
+        ASSERT_EQ(scene.layers.size(), 1u);
+        EXPECT_FALSE(scene.layers[0].automaton);
+        const SkySimulation sky(sky_options(scene, 0));
+        EXPECT_GE(sky.clouds().size(), row.least_clouds);
+        EXPECT_LE(sky.clouds().size(), row.most_clouds);
+        ASSERT_EQ(sky.options().skies.size(), 1u);
+        EXPECT_EQ(sky.options().skies[0].models.size(), row.models);
+        for (const SkyModel& model : sky.options().skies[0].models) EXPECT_EQ(model.generated, row.generated);
+        EXPECT_EQ(sky.shapes().size(), row.models * std::size_t(row.generated));
+        std::set<std::uint32_t> shown;
+        for (const SkyCloud& cloud : sky.clouds()) shown.insert(cloud.shape);
+        EXPECT_EQ(shown.size(), sky.shapes().size()) << "each of them is seen";
+    }
+    const Scene cirrus = read_scene(kFolder / "torchelsen" / "cirrus.toml");
+    const SkySimulation sky(sky_options(cirrus, 0));
+    const std::vector<SeedBox>& boxes = sky.shapes()[0].cloud.boxes;
+    EXPECT_EQ(boxes.size(), 15u);
+    int billboards = 0;
+    for (const SeedBox& box : boxes) billboards += box.billboards;
+    EXPECT_NEAR(billboards, 50, 10) << "his number";
 }
 
 }  // namespace

@@ -104,6 +104,79 @@ TEST(KeysWithoutEffect, OfLayersThatAreDrawnDirectly) {
     EXPECT_EQ(notes.size(), 2u);
 }
 
+// Each key alone: one note where no automaton reads it, and none where one does.
+TEST(KeysWithoutEffect, OfAutomataWhereAllLayersAreDrawnDirectly) {
+    const struct {
+        const char *layer, *model, *scene, *note;
+    } kKeys[] = {{"background = { act = 0.2 }\n", "", "", "layer 'low' is drawn directly: `background` has no effect"},
+                 {"[layer.detail]\nsize_m = 90\n", "", "", "layer 'low' is drawn directly: [layer.detail] has no effect"},
+                 {"", "centre = { hum = 0.2 }\n", "", "base model 'Cu': `centre` has no effect"},
+                 {"", "rim = { hum = 0.2 }\n", "", "base model 'Cu': `rim` has no effect"},
+                 {"", "seeds = [{ strength = 0.5 }]\n", "", "base model 'Cu': `seeds.strength` has no effect"},
+                 {"", "", "[field.background]\next = 0.3\n", "[field] has no effect"},
+                 {"", "", "[[field.profile]]\nlevels = [{ height_m = 0, hum = 0.1 }]\n", "[field] has no effect"},
+                 {"", "", "[density]\nrefine = 2\n", "[density] has no effect"},
+                 {"", "", "[density]\nper_layer = false\n", "[density] has no effect"},
+                 {"", "", "[detail]\nsize_m = 90\n", "[detail] has no effect"}};
+    for (const auto& key : kKeys) {
+        const std::string model = std::string(key.model).starts_with("seeds")
+                                      ? key.model
+                                      : std::string(key.model) + "seeds = [{ size_m = [200, 200, 200] }]\n";
+        const auto notes = [&](const std::string& automaton) {
+            return keys_without_effect(layer_scene(automaton + key.layer + key.scene, model));
+        };
+        EXPECT_EQ(notes("automaton = true\n"), Notes{}) << key.note;
+        EXPECT_EQ(count(notes("automaton = false\n"), key.note), 1) << key.note;
+        EXPECT_EQ(notes("automaton = false\n").size(), 1u) << key.note;
+    }
+}
+
+TEST(KeysWithoutEffect, OfSeedsWhoseModelHasPictures) {
+    const auto notes = [](const std::string& keys, const std::string& automaton) {
+        return keys_without_effect(layer_scene(automaton, keys));
+    };
+    const std::string seeds = "seeds = [{ texture = \"wispy\" }]\n", textures = "textures = [\"a.png\"]\n";
+    EXPECT_EQ(notes(seeds, "automaton = false\n"), Notes{});
+    EXPECT_EQ(notes(textures + "seeds = [{}]\n", "automaton = false\n"), Notes{});
+    EXPECT_EQ(count(notes(textures + seeds, "automaton = false\n"), "`seeds.texture` has no effect: its `textures`"), 1);
+    EXPECT_EQ(count(notes(textures + seeds, "automaton = true\n"), "`seeds.texture`"), 0) << "all of billboards is noted";
+}
+
+TEST(KeysWithoutEffect, OfCloudsThatCannotComeOverTheHorizon) {
+    const std::string horizon = "automaton = true\nentering = \"horizon\"\n",
+                      profile = "[[wind]]\nlevels = [{ height_m = 0, east_m_per_s = 5 }]\n",
+                      field = "[[wind_field]]\nkind = \"vortex\"\n";
+    EXPECT_EQ(keys_without_effect(layer_scene(horizon + profile)), Notes{});
+    EXPECT_EQ(keys_without_effect(layer_scene(horizon + profile + field)), Notes{});
+    EXPECT_EQ(count(keys_without_effect(layer_scene(horizon)), "no cloud will ever enter or leave"), 1);
+    const Notes carried = keys_without_effect(layer_scene(horizon + field));
+    EXPECT_EQ(count(carried, "no cloud will ever enter: `entering` is \"horizon\", and only the profile"), 1);
+    EXPECT_EQ(carried.size(), 1u);
+    EXPECT_EQ(keys_without_effect(layer_scene("automaton = true\n" + field)), Notes{});
+}
+
+TEST(KeysWithoutEffect, OfClimateAndTile) {
+    const std::string text =
+        "[lattice]\ncells = [40, 40, 100]\ncell_size_m = 100\n[[wind]]\nlevels = [{ height_m = 0, east_m_per_s = 5 }]\n"
+        "[[sky]]\nname = \"s\"\nstate = 0\n[[layer]]\nname = \"a\"\nskies = \"s\"\ngenus = \"Cu\"\n";
+    const auto notes = [&](std::vector<std::string> overrides, const std::string& bases = "genus = \"Cu\"") {
+        std::string of = text;
+        of.replace(of.find("genus = \"Cu\""), 12, bases);
+        return keys_without_effect(read_scene_text(of, "notes.toml", {}, overrides));
+    };
+    const std::string polar = "climate.region=polar", height = "base_height_m = 1200";
+    EXPECT_EQ(notes({polar}), Notes{});
+    EXPECT_EQ(notes({polar, "layer[0].automaton=false", "ground.height_m=300"}), Notes{});
+    EXPECT_EQ(notes({}, height), Notes{});
+    EXPECT_EQ(count(notes({polar}, height), "`climate.region` has no effect"), 1);
+
+    const std::string horizon = "layer[0].entering=horizon";
+    EXPECT_EQ(notes({"tile=true"}), Notes{});
+    EXPECT_EQ(notes({horizon}), Notes{});
+    EXPECT_EQ(count(notes({"tile=true", horizon}), "layer 'a': `entering` has no effect: in a `tile`"), 1);
+    EXPECT_EQ(notes({"tile=true", horizon, "wind=[]"}).size(), 1u);
+}
+
 TEST(KeysWithoutEffect, OfLayersWithAnAutomaton) {
     EXPECT_EQ(keys_without_effect(layer_scene("automaton = true\n")), Notes{});
     const Notes notes = keys_without_effect(layer_scene(
@@ -135,6 +208,9 @@ TEST(KeysWithoutEffect, OfTheGroundAndTheLight) {
     };
     EXPECT_TRUE(alone("[water]\nwind_m_per_s = 3\n", "[water] has no effect"));
     EXPECT_TRUE(alone("[light]\ndroplet_variance = 0.2\nbows = 0\n", "`light.droplet_variance` has no effect"));
+    EXPECT_TRUE(alone("[light]\nlight_distance_m = 300\n", "`light.light_distance_m` has no effect"));
+    EXPECT_EQ(keys_without_effect(scene_of("[light]\nlight_distance_m = 300\nlighting = \"cfa\"\n")), Notes{});
+    EXPECT_EQ(keys_without_effect(scene_of("[light]\nlight_distance_m = 300\n[[lightning]]\ntime_s = 5\nposition_m = [0, 0, 900]\n")), Notes{});
     EXPECT_TRUE(alone("[precipitation]\nsplashes = 1\nenabled = false\n", "`precipitation.splashes` has no effect"));
     EXPECT_TRUE(alone("[ground]\npattern = \"water\"\n[wet_ground]\nenabled = true\n", "[wet_ground] has no effect"));
 }

@@ -153,6 +153,16 @@ TEST(Shear, LeansByTheDifferenceOfTheWinds) {
     EXPECT_NEAR(lean.x, 200, 1e-9);
     EXPECT_NEAR(lean.y, -40, 1e-9);
     EXPECT_EQ(lean.z, 0);
+    // A vortex that begins above the centre turns what is there, and a field of all heights leans nothing.
+    options.wind.fields = {{.kind = WindFieldKind::vortex, .radius_m = 1e5, .speed_m_per_s = 50,
+                            .bottom_m = centre + 100, .top_m = centre + 1000},
+                           {.kind = WindFieldKind::shear_line, .radius_m = 10, .speed_m_per_s = 7, .bottom_m = 0,
+                            .top_m = 10'000}};
+    const Vec3 middle = sky.position_m(cloud) + sky.shape(cloud).centre_m,
+               more = SkySimulation(options).lean_m(cloud, form, centre + 200, 0) - lean;
+    EXPECT_NEAR(more.x, 100 * -middle.y * 50 / 1e5, 1e-9);
+    EXPECT_NEAR(more.y, 100 * middle.x * 50 / 1e5, 1e-9);
+    EXPECT_GT(length(more), 1);
     options.shear_s = 0;
     EXPECT_EQ(SkySimulation(options).lean_m(cloud, form, centre + 200, 0), Vec3{});
 }

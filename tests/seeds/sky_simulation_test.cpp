@@ -425,21 +425,25 @@ TEST(SkySimulation, CloudsReEnterAPeriodicWorld) {
     }
 }
 
-// A change of state makes clouds inside, and they form; the saved state goes on with the same bits.
+// A change of state makes clouds inside, and they form, also where they would enter over a horizon; the saved state goes on
+// with the same bits.
 TEST(SkySimulation, ChangesStateInAPeriodicWorld) {
-    SkyOptions options = small_sky();
-    options.periodic = true;
-    options.wind = constant_wind(12, -3);
-    options.schedule = {{0, 0}, {600, 1}};
-    SkySimulation sky(options), restored(options);
-    for (int step = 0; step < 50; ++step) sky.step();
-    restored.restore(sky.save());
-    for (int step = 0; step < 70; ++step) {
-        sky.step();
-        restored.step();
+    for (const Entering entering : {Entering::anywhere, Entering::horizon}) {
+        SkyOptions options = small_sky();
+        options.periodic = true;
+        options.entering = entering;
+        options.wind = constant_wind(12, -3);
+        options.schedule = {{0, 0}, {600, 1}};
+        SkySimulation sky(options), restored(options);
+        for (int step = 0; step < 50; ++step) sky.step();
+        restored.restore(sky.save());
+        for (int step = 0; step < 70; ++step) {
+            sky.step();
+            restored.step();
+        }
+        EXPECT_EQ(fingerprint(sky), fingerprint(restored));
+        EXPECT_EQ(sky.count(), 80u);
     }
-    EXPECT_EQ(fingerprint(sky), fingerprint(restored));
-    EXPECT_EQ(sky.count(), 80u);
 }
 
 }  // namespace

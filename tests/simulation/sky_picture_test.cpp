@@ -104,8 +104,7 @@ TEST(SkyBillboards, StandInTheirBoxesAndAbsorbWhatTheirBoxesDo) {
 }
 
 // What the frustum leaves out cannot be seen: the same picture without, bit for bit, from inside of the sky.
-TEST(SkyBillboards, CullingChangesNoBitOfAPicture) {
-    SkySimulation sky(sky_of(150));
+void expect_culling_to_change_nothing(const SkySimulation& sky) {
     Renderer renderer{DeviceOptions{.device = {}, .validation = true}};
     for (const Vec3 target : {Vec3{0, 0, 1200}, Vec3{500, -300, 900}, Vec3{-4000, 1000, 4000}}) {
         RenderOptions options = from_the_edge();
@@ -125,6 +124,17 @@ TEST(SkyBillboards, CullingChangesNoBitOfAPicture) {
         EXPECT_EQ(a.transmittance, b.transmittance);
     }
     EXPECT_TRUE(renderer.validation_messages().empty());
+}
+
+TEST(SkyBillboards, CullingChangesNoBitOfAPicture) { expect_culling_to_change_nothing(SkySimulation(sky_of(150))); }
+
+// Billboards that a field of the wind takes far from their clouds.
+TEST(SkyBillboards, CullingChangesNoBitOfShearedClouds) {
+    SkyOptions options = sky_of(150);
+    options.shear_s = 300;
+    options.wind.fields = {{.kind = WindFieldKind::shear_line, .radius_m = 1, .speed_m_per_s = 8, .direction_deg = 90,
+                            .bottom_m = 1200, .top_m = 9000}};
+    expect_culling_to_change_nothing(SkySimulation(options));
 }
 
 // In a film with a bound, a moving sun changes at most that many clouds a frame, and each cloud in its turn;
