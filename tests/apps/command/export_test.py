@@ -302,7 +302,7 @@ class Export(Case):
         sidecar = json.loads((folder / "placed.volume.json").read_text())
         self.assertEqual(sidecar["period_m"], [None] * 3)
         codes = numpy.rint(self.density / sidecar["scale"] * 255 + 1e-6).astype("u1")
-        names, _ = ndimage.label(self.density >= 0.3 * self.density.max())
+        names, _ = ndimage.label(self.density >= numpy.float32(0.3) * numpy.float32(self.density.max()))
         masses = ndimage.sum_labels(self.density, names, range(1, names.max() + 1))
         whole = ndimage.binary_dilation(names == 1 + masses.argmax(), iterations=3, mask=codes > 0)
         cloud = numpy.where(whole, codes, 0)
