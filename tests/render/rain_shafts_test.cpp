@@ -136,7 +136,8 @@ TEST(RainShafts, ShadeThemselvesAsMuchAsTheirRain) {
     }
 }
 
-// With the sun behind it the rain is darker within and bright at its rim; the other way round its face is.
+// A face of heavy rain that is in the sun is bright, one that the rain itself shades is dark; thin rain is as bright on both
+// sides, but for its phase function.
 TEST(RainShafts, AreDarkerFarFromTheSun) {
     RainCurtain curtain = area();
     curtain.rate_mm_per_h = 60;
@@ -144,6 +145,7 @@ TEST(RainShafts, AreDarkerFarFromTheSun) {
     options.precipitation.shaft_texture = 0;
     options.camera.vertical_fov_deg = 20;
     options.sun.elevation_deg = 10;
+    options.air.extinction_per_m = {0, 0, 0};
     const CameraFrame camera = camera_frame(options.camera);
     const auto middle = [&](double sun_azimuth_deg, double rate_mm_per_h) {
         options.sun.azimuth_deg = sun_azimuth_deg;

@@ -117,7 +117,7 @@ TEST(Splashes, AreAFunctionOfTimeAndSeed) {
     EXPECT_EQ(same, 0u);
 }
 
-TEST(Splashes, NeedRainAndLevelGroundNearTheEye) {
+TEST(Splashes, NeedRainAndKnownGroundNearTheEye) {
     const Weather weather = rain_of(10);
     const auto number = [&](RenderOptions options, const Weather& of) {
         return splashes_at(frame_of(options, 5), of).size();
