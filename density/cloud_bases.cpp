@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numeric>
 
 #include "density/openvdb_access.h"
@@ -50,6 +51,39 @@ TexelsOfColumn texels_of(int column, double texel) {
 }
 
 int texels_along(int columns, double texel) { return int(std::ceil(columns / texel - 1e-9)); }
+
+// The lowest undersides of the pieces over each texel, and what they let through together.
+struct PieceColumns {
+    static constexpr float kNone = std::numeric_limits<float>::infinity();
+    static constexpr double kLeastOpaque = 0.1;  // of a piece that makes a base beside others
+    std::vector<float> through, opaque_base_m, base_m;
+    explicit PieceColumns(std::size_t texels)
+        : through(texels, 1.0f), opaque_base_m(texels, kNone), base_m(texels, kNone) {}
+
+    void add(std::size_t texel, double opacity, float underside_m) {
+        through[texel] *= float(1 - opacity);
+        base_m[texel] = std::min(base_m[texel], underside_m);
+        if (opacity >= kLeastOpaque) opaque_base_m[texel] = std::min(opaque_base_m[texel], underside_m);
+    }
+};
+
+// Adds a piece to the texels below it.
+void add_piece(const CloudPiece& piece, const CloudBases& grid, PieceColumns& columns) {
+    const double true_radius_m = 0.5 * piece.width_m, radius_m = std::max(true_radius_m, grid.texel_m);
+    const double most = std::clamp(piece.opacity, 0.0, 1.0) * std::pow(true_radius_m / radius_m, 2);
+    const double x = (piece.centre_m.x - grid.x_m) / grid.texel_m - 0.5,
+                 y = (piece.centre_m.y - grid.y_m) / grid.texel_m - 0.5, reach = radius_m / grid.texel_m;
+    const auto first = [&](double at) { return int(std::clamp(std::ceil(at - reach), 0.0, 1e6)); };
+    const auto last = [&](double at, int count) { return int(std::clamp(std::floor(at + reach), -1.0, count - 1.0)); };
+    for (int j = first(y); j <= last(y, grid.rows); ++j) {
+        for (int i = first(x); i <= last(x, grid.columns); ++i) {
+            const double inside = 1 - ((i - x) * (i - x) + (j - y) * (j - y)) / (reach * reach);
+            if (inside <= 0) continue;
+            columns.add(std::size_t(j) * std::size_t(grid.columns) + std::size_t(i), most * inside,
+                        float(piece.centre_m.z - 0.5 * piece.height_m * std::sqrt(inside)));
+        }
+    }
+}
 
 int modulo(int n, int count) { return (n % count + count) % count; }
 
@@ -102,6 +136,30 @@ CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m, cons
                 }
             }
         }
+    }
+    return bases;
+}
+
+CloudBases cloud_bases(std::span<const CloudPiece> pieces, const Vec2& low_m, const Vec2& high_m) {
+    CloudBases bases;
+    const double width_m = high_m.x - low_m.x, length_m = high_m.y - low_m.y;
+    if (pieces.empty() || !(width_m > 0 && length_m > 0)) return bases;
+    // A texel more on each side, so that those within have neighbours.
+    bases.texel_m = std::max(width_m, length_m) / (CloudBases::kMostTexels - 2);
+    bases.x_m = low_m.x - bases.texel_m;
+    bases.y_m = low_m.y - bases.texel_m;
+    bases.columns = int(std::ceil(width_m / bases.texel_m - 1e-9)) + 2;
+    bases.rows = int(std::ceil(length_m / bases.texel_m - 1e-9)) + 2;
+    const std::size_t count = std::size_t(bases.columns) * std::size_t(bases.rows);
+    PieceColumns columns(count);
+    for (const CloudPiece& piece : pieces) add_piece(piece, bases, columns);
+    bases.water.resize(count);
+    bases.water_base_m.assign(count, 0.0f);
+    for (std::size_t n = 0; n < count; ++n) {
+        bases.water[n] = 1 - columns.through[n];
+        const float base_m =
+            columns.opaque_base_m[n] < PieceColumns::kNone ? columns.opaque_base_m[n] : columns.base_m[n];
+        if (bases.water[n] > 0) bases.water_base_m[n] = bases.water[n] * base_m;
     }
     return bases;
 }

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The lowest cloud above each place and the water in it, from a density grid: where rain of that cloud begins and how much
-// of it falls.
+// The lowest cloud above each place and the water in it, from a density grid or from billboards: where rain of that cloud
+// begins and how much of it falls.
 
+#include <span>
 #include <vector>
 
 #include "automaton/lattice.h"
+#include "core/vec.h"
 #include "density/density_grid.h"
 
 namespace nephos {
@@ -39,5 +41,17 @@ struct CloudBases {
 // thread-safe.
 CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m,
                        const Boundaries& boundaries = {});
+
+// A piece of a cloud without density: a spheroid with an upright axis, as a billboard shows it from all sides.
+struct CloudPiece {
+    Vec3 centre_m{};                       // world
+    double width_m = 100, height_m = 100;  // > 0
+    double opacity = 1;                    // 0..1 in its middle, seen from below; 1 - r^2 of that at r radii beside it
+};
+
+// Returns the bases of pieces within a rectangle of the world: in each texel the lowest underside of the pieces above it,
+// and as water what they hide together, 1 - the product of 1 - opacity. Pieces with an opacity of less than a tenth there
+// make a base only where no other does; pieces smaller than a texel cover a part of it. Pure; thread-safe.
+CloudBases cloud_bases(std::span<const CloudPiece> pieces, const Vec2& low_m, const Vec2& high_m);
 
 }  // namespace nephos

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <system_error>
@@ -14,6 +15,7 @@
 #include "core/wind.h"
 #include "density/veil.h"
 #include "scenes/format/layers.h"
+#include "simulation/cloud_pieces.h"
 #include "simulation/frame_detail.h"
 #include "simulation/memory.h"
 #include "simulation/scene_files.h"
@@ -64,13 +66,28 @@ void fall_from(const std::shared_ptr<const CloudBases>& cloud, RainCurtain& curt
     curtain.cloud = cloud;
 }
 
+// The cloud of billboards above the rain areas of a layer.
+std::shared_ptr<const CloudBases> cloud_of_billboards(const LayerFrame& layer, double time_s) {
+    const double most = std::numeric_limits<double>::max();
+    Vec2 low_m{most, most}, high_m{-most, -most};
+    for (const RainArea& area : layer.rain) {
+        const double x_m = std::hypot(area.semi_a_m * area.axis_x, area.semi_b_m * area.axis_y),
+                     y_m = std::hypot(area.semi_a_m * area.axis_y, area.semi_b_m * area.axis_x);
+        low_m = {std::min(low_m.x, area.x_m - x_m), std::min(low_m.y, area.y_m - y_m)};
+        high_m = {std::max(high_m.x, area.x_m + x_m), std::max(high_m.y, area.y_m + y_m)};
+    }
+    return std::make_shared<CloudBases>(
+        cloud_bases(cloud_pieces(*layer.sky, layer.clouds, time_s), low_m, high_m));
+}
+
 // The cloud that the rain of a layer falls from: its own, or of a layer whose density is not known that of all. Null: none
 // is known.
 std::shared_ptr<const CloudBases> cloud_of(const Scene& scene, std::size_t n, const LayerFrame& layer,
-                                           const DensityGrid& all) {
+                                           const DensityGrid& all, double time_s) {
     const bool own = layer.density.extent().cells() > 0;
+    if (!own && layer.direct) return layer.sky != nullptr ? cloud_of_billboards(layer, time_s) : nullptr;
     const DensityGrid& density = own ? layer.density : all;
-    if ((!own && layer.direct) || density.extent().cells() == 0) return nullptr;
+    if (density.extent().cells() == 0) return nullptr;
     const LayerOptions& options = scene.layers[n];
     const bool whole = density.extent() == options.extent && density.placement() == options.placement;
     return std::make_shared<CloudBases>(
@@ -239,7 +256,7 @@ Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, const
     for (std::size_t n = 0; n < layers.size(); ++n) {
         const Range& base = scene.layers[n].base_height_m;
         const std::shared_ptr<const CloudBases> cloud =
-            layers[n].rain.empty() ? nullptr : cloud_of(scene, n, layers[n], all);
+            layers[n].rain.empty() ? nullptr : cloud_of(scene, n, layers[n], all, time_s);
         for (const RainArea& area : layers[n].rain) {
             RainCurtain curtain;
             curtain.id = area.id;

@@ -108,8 +108,9 @@ class FramePainter {
 
 // Returns the rain or snow of a frame as the renderer draws it: the curtains of all layers, from the ground of
 // the picture to the bases of the layer's cloud, column by column; of `all` clouds in a layer whose density is empty, as
-// when a file of the whole scene is drawn; in a layer that is drawn directly to the middle of its base heights; an area without cloud above has none. With the wind 50 m above the ground: the scene's, or that
-// of the first layer when the scene has none. A curtain leans as rain of 6 m/s (snow of 1 m/s) falls through air
+// when a file of the whole scene is drawn; of its billboards in a layer that is drawn directly. An area without cloud above
+// has none; where no cloud is known rain begins in the middle of the layer's base heights. With the wind 50 m above the
+// ground: the scene's, or that of the first layer when the scene has none. A curtain leans as rain of 6 m/s (snow of 1 m/s) falls through air
 // that moves otherwise than its cloud, by at most 1. Pure.
 Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, const DensityGrid& all,
                    double time_s);

@@ -68,6 +68,17 @@ DepthsInVoxels depths_in_voxels(std::span<const SkyLayer> layers, const Sun& sun
     return depths;
 }
 
+// The surface of a height map, its slope as mean over a stride.
+std::function<GroundSurface(double, double)> relief_of(std::shared_ptr<const HeightMap> map, const Ground& ground) {
+    return [map = std::move(map), ground](double x_m, double y_m) {
+        constexpr double kStride_m = 1;
+        const double z_m = ground_height_at(map.get(), ground, x_m, y_m);
+        if (!(height_at(*map, x_m, y_m) >= z_m)) return GroundSurface{z_m};
+        const MeanSlope slope = mean_slope(*map, x_m, y_m, kStride_m);
+        return GroundSurface{z_m, slope.x, slope.y};
+    };
+}
+
 }  // namespace
 
 Light light_of(const Sun& sun) { return {direction_to_sun(sun), true}; }
@@ -263,6 +274,7 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
         rainfall->options.camera = standing_camera(moving.camera, terrain_.get(), moving.ground,
                                                    std::array{time_s - half_s, time_s, time_s + half_s});
         rainfall->options.sun = options.sun;
+        if (terrain_) rainfall->weather.relief = relief_of(terrain_, moving.ground);
         if (ground_cover) rainfall->options.ground.albedo = mean_albedo(options, *ground_cover);
     }
     DepthsInVoxels depths = depths_in_voxels(layers, options.sun, flash, time_s);

@@ -31,7 +31,7 @@ struct PrecipitationOptions {
     // Virga: rain evaporates as it falls, completely at this fraction of the height from ground to cloud; 0:
     // all of it reaches the ground.
     double evaporation = 0;  // 0..1
-    // Factor of the number of splashes of drops on level ground and water within 30 m of the eye, 0..10; 1 is physical,
+    // Factor of the number of splashes of drops on ground and water within 30 m of the eye, 0..10; 1 is physical,
     // 0: none (splashes.h).
     double splashes = 0;
     bool operator==(const PrecipitationOptions&) const = default;

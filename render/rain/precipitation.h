@@ -12,6 +12,7 @@
 // position of the eye, and particles are fixed in the air: nothing pops.
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -22,12 +23,20 @@
 
 namespace nephos {
 
-// The rain at the time of a frame. Plain data.
+// The surface of the ground at a place of the world.
+struct GroundSurface {
+    double z_m = 0;
+    double slope_x = 0, slope_y = 0;  // dz/dx and dz/dy
+};
+
+// The rain at the time of a frame.
 struct Weather {
     std::uint64_t seed = 0;
     std::vector<RainCurtain> curtains;
     double wind_x_m_per_s = 0, wind_y_m_per_s = 0;  // near the ground, times PrecipitationOptions::wind_drift
     double carried_x_m = 0, carried_y_m = 0;        // displacement of the air since time 0, likewise
+    // Ground that is not level, at x and y of the world; thread-safe. Null: it is level, or not known.
+    std::function<GroundSurface(double, double)> relief{};
 };
 
 // The rain of one picture.

@@ -194,6 +194,27 @@ HWY_INLINE Floats extinction(const ShaftPass& p, const SeenCurtain& c, const Way
     return hn::Mul(even, fast_exp(power));
 }
 
+// Returns the optical depth of one curtain from points of rays in it to the sun, 0 elsewhere; see rain_shafts.h.
+HWY_INLINE Floats depth_to_sun(const ShaftPass& p, const SeenCurtain& c, const Way& way, Floats rise, Floats t) {
+    const Lanes d;
+    const Floats zero = hn::Zero(d), x = hn::MulAdd(t, way.x, set(c.eye_x)), y = hn::MulAdd(t, way.y, set(c.eye_y));
+    const float a = std::max(c.sun_x * c.sun_x + c.sun_y * c.sun_y, 1e-14f);
+    const Floats b = hn::MulAdd(x, set(c.sun_x), hn::Mul(y, set(c.sun_y)));
+    const Floats inside = hn::NegMulAdd(x, x, hn::NegMulAdd(y, y, set(1)));
+    const Floats root = hn::Sqrt(hn::Max(hn::MulAdd(b, b, hn::Mul(set(a), inside)), zero));
+    const Floats height_m = hn::MulAdd(t, rise, set(c.eye_z)),
+                 top = hn::Mul(hn::Sub(set(c.height_m), height_m), set(1 / std::max(p.to_sun.z, 1e-3f)));
+    const Floats way_m = hn::Min(hn::Mul(hn::Sub(root, b), set(1 / a)), top);
+    // The integral of (1 - r^2)^2 over way_m, divided by it.
+    Floats mean = hn::MulAdd(way_m, set(0.2f * a * a), hn::Mul(set(a), b));
+    mean = hn::MulAdd(way_m, mean, hn::MulAdd(set(4.0f / 3), hn::Mul(b, b), hn::Mul(set(-2.0f / 3 * a), inside)));
+    mean = hn::MulAdd(way_m, mean, hn::Mul(set(-2), hn::Mul(inside, b)));
+    mean = hn::MulAdd(way_m, mean, hn::Mul(inside, inside));
+    const Floats depth = hn::Mul(hn::Mul(set(c.sun_per_m), way_m), hn::MulAdd(set(p.sun_profile), mean, set(1 - p.sun_profile)));
+    const Mask within = hn::And(hn::And(hn::Gt(inside, zero), hn::Ge(height_m, zero)), hn::Gt(way_m, zero));
+    return hn::IfThenElseZero(within, hn::Max(depth, zero));
+}
+
 // The curtains that some rays intersect; allocated once a row.
 struct MetCurtains {
     static constexpr std::size_t kParts = 7;

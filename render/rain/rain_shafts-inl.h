@@ -126,6 +126,14 @@ HWY_INLINE void add(Through& run, Floats depth, const Floats3& light) {
     run.transmittance = hn::Mul(run.transmittance, kept);
 }
 
+// Returns what the curtains around points of rays leave of the sun's light.
+HWY_INLINE Floats sun_left(const ShaftPass& p, const MetCurtains& met, const Floats3& ray, Floats t) {
+    Floats deepest = hn::Zero(Lanes());
+    for (std::size_t m = 0; m < met.count; ++m)
+        deepest = hn::Max(deepest, depth_to_sun(p, *met.curtains[m], met.way(m), ray.z, t));
+    return fast_exp(hn::Neg(deepest));
+}
+
 // Marches one interval of every ray, or the part of it before or behind the pixels' clouds.
 HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, const Floats3& sun,
                       const Floats3& horizon, Floats begin, Floats end, Floats offset, Through& run) {
@@ -158,7 +166,8 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
             depth = hn::MulAdd(densest, step, depth);
         }
         if (hn::AllFalse(d, hn::Gt(depth, zero))) continue;
-        const Floats3 seen = mix(horizon, radiance(p, ray, sun, middle), kept);
+        const Floats3 lit = p.has_sun ? times(sun_left(p, met, ray, middle), sun) : sun;
+        const Floats3 seen = mix(horizon, radiance(p, ray, lit, middle), kept);
         add(run, depth, seen);
     }
 }

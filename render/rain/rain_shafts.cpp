@@ -67,6 +67,14 @@ float within_noise(double cells) {
     return float(cells - kShaftNoiseSide * std::floor(cells / kShaftNoiseSide));
 }
 
+// Sets how the curtain shades itself from the sun.
+void set_sun(const RainCurtain& c, const Vec3& to_sun, SeenCurtain& out) {
+    const double x = to_sun.x - c.lean_x * to_sun.z, y = to_sun.y - c.lean_y * to_sun.z;
+    out.sun_x = float((c.axis_x * x + c.axis_y * y) / c.semi_a_m);
+    out.sun_y = float((c.axis_x * y - c.axis_y * x) / c.semi_b_m);
+    out.sun_per_m = out.per_m * float(mean_water(c));
+}
+
 SeenCurtain seen_curtain(const RainCurtain& c, const PrecipitationOptions& p, const Vec3& eye,
                          double time_s) {
     SeenCurtain out;
@@ -161,6 +169,26 @@ double left_of_rain(double height, double evaporation) {
     return s * (2 - s);
 }
 
+double sun_profile(double softness) { return std::min(1.0, softness * (1.5 - 0.45 * softness)); }
+
+double mean_water(const RainCurtain& c) {
+    constexpr int kAlong = 16;
+    if (!c.cloud) return 1;
+    double sum = 0;
+    int places = 0;
+    for (int j = 0; j < kAlong; ++j) {
+        for (int i = 0; i < kAlong; ++i) {
+            const double u = (2 * i + 1.0) / kAlong - 1, v = (2 * j + 1.0) / kAlong - 1;
+            if (u * u + v * v >= 1) continue;
+            const Ellipse top = ellipse_at(c, c.base_m);
+            const double a = u * top.semi_a_m, b = v * top.semi_b_m;
+            sum += c.cloud->at(top.x_m + a * top.axis_x - b * top.axis_y, top.y_m + a * top.axis_y + b * top.axis_x).water;
+            ++places;
+        }
+    }
+    return sum / places;
+}
+
 double shaft_grain_m(const RainCurtain& c) {
     return std::clamp(0.3 * std::min(c.semi_a_m, c.semi_b_m), 20.0, 400.0);
 }
@@ -179,8 +207,11 @@ ShaftPass shaft_pass(const Picture& picture, const RenderOptions& options, const
                      std::span<const RainCurtain> curtains, const PrecipitationLight& light, double time_s) {
     const PrecipitationOptions& p = options.precipitation;
     ShaftPass pass;
-    for (const RainCurtain& c : curtains)
-        if (falls(c)) pass.curtains.push_back(seen_curtain(c, p, camera.position_m, time_s));
+    for (const RainCurtain& c : curtains) {
+        if (!falls(c)) continue;
+        pass.curtains.push_back(seen_curtain(c, p, camera.position_m, time_s));
+        if (any(light.sun)) set_sun(c, light.to_sun, pass.curtains.back());
+    }
     pass.forward = floats(camera.forward);
     pass.right = floats(camera.half_width * camera.right);
     pass.up = floats(camera.half_height * camera.up);
@@ -188,6 +219,7 @@ ShaftPass shaft_pass(const Picture& picture, const RenderOptions& options, const
     pass.column = 2 / float(options.camera.width);
     pass.row = 2 / float(options.camera.height);
     pass.softness = p.edge > 0 ? float(std::max(p.edge, kShaftSoftest)) : 0.0f;
+    pass.sun_profile = float(sun_profile(double(pass.softness)));
     pass.fray = float(kShaftFray * p.shaft_texture);
     pass.contrast = float(p.shaft_texture);
     pass.evaporation = float(p.evaporation);

@@ -21,6 +21,15 @@
 //     s = 0.6 N(x + o, y) + 0.4 N(4 x, 4 y + o),    o = id mod kShaftsOwn
 //     f = N(x + y, (height + kShaftFall time) / kShaftFallCell + o)
 //
+// A curtain shades itself: at a place in it the sun has exp(-depth) of its light, with the optical depth of the ray to the sun
+// in the same curtain. There the rain is the mean of its texture and of its cloud's water, at all heights the same, and
+// across the axis a polynomial that has the mean of smooth((1 - r) / softness) over the ellipse (sun_profile()),
+//
+//     1 - w + w (1 - r^2)^2,    w = softness (1.5 - 0.45 softness), at most 1.
+//
+// Along the ray, m metres towards the sun, r^2 is a parabola c + 2 b m + a m^2, so that the integral has a closed form. It ends
+// where the ray leaves the ellipse or the height of the cloud. Of curtains that overlap at the place the deepest counts.
+//
 // Each interval of a ray in curtains that touch or overlap is marched in kShaftSteps equal steps, or in as
 // many each before and behind a cloud inside it, with an offset of a quarter to three quarters of a step that
 // hides banding (tests/render/reference_shafts.h is the scalar form for one ray). Parts behind a cloud with a
@@ -51,6 +60,11 @@ double rain_extinction_per_m(PrecipitationKind kind, double rate_mm_per_h);
 
 // Returns the fraction of the rain that has not evaporated at a height between ground (0) and cloud (1).
 double left_of_rain(double height, double evaporation);
+
+// Returns the weight w of the profile of rain on the way of sunlight, for a softness of 0..1.
+double sun_profile(double softness);
+// Returns the mean of the water above a curtain's ellipse, 0..1: of its rain in its rate.
+double mean_water(const RainCurtain& curtain);
 
 // Returns the width of a curtain's strands, metres.
 double shaft_grain_m(const RainCurtain& curtain);

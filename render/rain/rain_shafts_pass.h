@@ -24,6 +24,7 @@ struct SeenCurtain {
     float height_m = 1, per_height = 1;               // of the cloud above the ground
     float reach_m = 0, centre_x = 0, centre_y = 0;    // circle around it, from the eye
     float per_m = 0;                                  // extinction where the rain is whole
+    float sun_x = 0, sun_y = 0, sun_per_m = 0;        // a metre towards the sun, in units; extinction of its light
     float grain_x = 0, grain_y = 0, per_grain = 0;    // the eye in cells of the texture, from metres to cells
     float own = 0;                                    // its part of the noise
     float fall = 0, per_fall = 1 / kShaftFallCell_m;  // of the texture, likewise
@@ -42,6 +43,7 @@ struct ShaftPass {
     std::vector<SeenCurtain> curtains;
     std::vector<std::uint32_t> noise;  // shaft_noise_cells()
     float softness = 0, fray = 0, contrast = 0, evaporation = 0;
+    float sun_profile = 0;
     float clear_m = 0;  // around the eye, where particles are drawn instead
     glm::vec3 by_sky{}, by_sunlit_ground{}, by_scattered_sun{}, sun{}, to_sun{}, flash{}, flash_m{}, air_per_m{};
     float horizon[3][PictureAir::kHorizons] = {};  // PictureAir::horizon

@@ -55,12 +55,16 @@ double share_of_level(int level, double distance_m) {
     return (level == 0 ? 1.0 : outside(level - 1, distance_m)) * (1 - outside(level, distance_m));
 }
 
+// The ground at a place: the weather's relief, or level.
+GroundSurface ground_at(const RainFrame& frame, const Weather& weather, double x_m, double y_m) {
+    return weather.relief ? weather.relief(x_m, y_m) : GroundSurface{frame.options.ground.height_m};
+}
+
 // Adds the splashes of one level, row by row.
 void add_level(const RainFrame& frame, const Weather& weather, const std::vector<GroundRain>& rain, int level,
                std::vector<Splash>& out) {
     const PrecipitationOptions& p = frame.options.precipitation;
     const Vec3& eye = frame.camera.position_m;
-    const double ground_m = frame.options.ground.height_m;
     const double slot_m = kFinestSlot_m * std::exp2(level),
                  reach_m = kSplashReach_m * std::exp2(level + 1 - kLevels);
     const double chance_per_flux = slot_m * slot_m * kSplashPeriod_s * p.splashes;
@@ -68,8 +72,8 @@ void add_level(const RainFrame& frame, const Weather& weather, const std::vector
     const auto last = [&](double at) { return std::int64_t(std::floor((at + reach_m) / slot_m)); };
     for (std::int64_t row = first(eye.y); row <= last(eye.y); ++row) {
         for (std::int64_t column = first(eye.x); column <= last(eye.x); ++column) {
-            const Vec3 middle{(double(column) + 0.5) * slot_m, (double(row) + 0.5) * slot_m, ground_m};
-            const Vec3 way = middle - eye;
+            const double x_m = (double(column) + 0.5) * slot_m, y_m = (double(row) + 0.5) * slot_m;
+            const Vec3 way = Vec3{x_m, y_m, ground_at(frame, weather, x_m, y_m).z_m} - eye;
             const double share = share_of_level(level, std::sqrt(way.x * way.x + way.y * way.y));
             if (share <= 0 || dot(way, frame.camera.forward) < -slot_m) continue;
             // When the slot's periods begin is its own; what happens in one is drawn anew each time.
@@ -82,12 +86,15 @@ void add_level(const RainFrame& frame, const Weather& weather, const std::vector
             const double begun = frame.time_s / kSplashPeriod_s + unit_interval(words(0, 2)[0]);
             const double period = std::floor(begun);
             const PhiloxWords drawn = words(std::int64_t(period), 0), more = words(std::int64_t(period), 1);
-            const Vec3 place{(double(column) + unit_interval(drawn[0])) * slot_m,
-                             (double(row) + unit_interval(drawn[1])) * slot_m, ground_m};
+            Vec3 place{(double(column) + unit_interval(drawn[0])) * slot_m,
+                       (double(row) + unit_interval(drawn[1])) * slot_m, 0};
+            const GroundSurface ground = ground_at(frame, weather, place.x, place.y);
+            if (std::hypot(ground.slope_x, ground.slope_y) > kSteepestSplash) continue;
+            place.z = ground.z_m;
             const double chance = chance_per_flux * flux_at(rain, p, place);
             if (unit_interval(drawn[2]) >= chance) continue;
             const double weight = share * std::max(chance, 1.0);
-            out.push_back({place.x, place.y, (begun - period) * kSplashPeriod_s, weight,
+            out.push_back({place.x, place.y, ground, (begun - period) * kSplashPeriod_s, weight,
                            unit_interval(drawn[3]), unit_interval(more[0])});
         }
     }
@@ -144,8 +151,9 @@ void add_droplets(const SplashView& view, const Splash& splash, const Vec3& plac
                      speed = 0.7 + 0.6 * splash.strength * (0.4 + 0.6 * draw);
         const auto at = [&](double age_s) {
             const double t = std::max(age_s, 0.0), along = speed * std::cos(slope) * t;
-            return place + Vec3{along * std::cos(azimuth), along * std::sin(azimuth),
-                                std::max(0.0, speed * std::sin(slope) * t - 0.5 * kGravity * t * t)};
+            const double x = along * std::cos(azimuth), y = along * std::sin(azimuth);
+            const double surface = splash.ground.slope_x * x + splash.ground.slope_y * y;
+            return place + Vec3{x, y, std::max(surface, speed * std::sin(slope) * t - 0.5 * kGravity * t * t)};
         };
         const double lands_s = 2 * speed * std::sin(slope) / kGravity;
         if (splash.age_s >= lands_s) continue;
@@ -173,10 +181,10 @@ double throwing_drops(const SizeLaw& law) {
 
 std::vector<Splash> splashes_at(const RainFrame& frame, const Weather& weather) {
     const PrecipitationOptions& p = frame.options.precipitation;
-    const double above_m = frame.camera.position_m.z - frame.options.ground.height_m;
-    if (p.splashes <= 0 || p.kind != PrecipitationKind::rain || frame.options.terrain.any() || above_m <= 0 ||
-        above_m > kHighestEye_m)
-        return {};
+    const Vec3& eye = frame.camera.position_m;
+    if (p.splashes <= 0 || p.kind != PrecipitationKind::rain || (frame.options.terrain.any() && !weather.relief)) return {};
+    const double above_m = eye.z - ground_at(frame, weather, eye.x, eye.y).z_m;
+    if (above_m <= 0 || above_m > kHighestEye_m) return {};
     std::vector<GroundRain> rain;
     for (const RainCurtain& curtain : weather.curtains) {
         if (!falls(curtain)) continue;
@@ -191,10 +199,9 @@ std::vector<Splash> splashes_at(const RainFrame& frame, const Weather& weather) 
 
 std::vector<Streak> streaks_of_splashes(const RainFrame& frame, const std::vector<Splash>& splashes) {
     const SplashView view{frame, pixels_per_unit(frame.options.camera, frame.camera)};
-    const double ground_m = frame.options.ground.height_m;
     std::vector<Streak> streaks;
     for (const Splash& splash : splashes) {
-        const Vec3 place{splash.x_m, splash.y_m, ground_m}, way = place - frame.camera.position_m;
+        const Vec3 place{splash.x_m, splash.y_m, splash.ground.z_m}, way = place - frame.camera.position_m;
         const Rgb light = particle_radiance(frame.light, (1 / length(way)) * way, place, 0);
         add_crown(view, splash, place, light, streaks);
         add_droplets(view, splash, place, light, streaks);

@@ -67,6 +67,7 @@ struct SeenRain {
     vec4 lean;    // xy: metres a metre of height; z: noise of its own; w: its falls
     vec4 grain;   // xy: the eye in cells of the texture; z: cells a metre; w: cells of the falls a metre of height
     vec4 cloud;   // xy: the eye in texels of the cloud's bases; z: texels a metre; w: world height of the ground
+    vec4 sun;     // xy: a metre towards the sun, in units; z: extinction of its light; w: sun_profile()
     vec4 law;     // x: particles per m^3 and drawn one at diameter 0; y: growth of that a mm; z: 1 / height of the cloud
     // First word of the cloud's bases, columns, rows, and bits: 1, 2: it repeats along x, y. No columns: a level cloud.
     Words4 bases;
@@ -131,7 +132,7 @@ struct RainStep {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(SeenRain) == 128 && sizeof(RainUniforms) == 16 * (16 + kHorizonNodes) + 128 * kMostCurtains);
+static_assert(sizeof(SeenRain) == 144 && sizeof(RainUniforms) == 16 * (16 + kHorizonNodes) + 144 * kMostCurtains);
 static_assert(sizeof(RainUniforms) <= 16384);  // of which every device has as much
 static_assert(sizeof(RainPass) == 16 * (19 + kSwaySpeeds));
 static_assert(sizeof(RainParticle) == 32 && sizeof(RainStep) == 40);

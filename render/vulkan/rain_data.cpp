@@ -32,13 +32,14 @@ shader::uint add_bases(const CloudBases& cloud, std::vector<float>& to) {
     return first;
 }
 
-shader::SeenRain seen_rain(const SeenCurtain& c, const SizeLaw& law) {
+shader::SeenRain seen_rain(const SeenCurtain& c, float sun_profile, const SizeLaw& law) {
     shader::SeenRain to{};
     to.eye = {c.eye_x, c.eye_y, c.eye_z, c.height_m};
     to.axes = {c.ax, c.ay, c.bx, c.by};
     to.circle = {c.centre_x, c.centre_y, c.reach_m, c.per_m};
     to.lean = {c.lean_x, c.lean_y, c.own, c.fall};
     to.grain = {c.grain_x, c.grain_y, c.per_grain, c.per_fall};
+    to.sun = {c.sun_x, c.sun_y, c.sun_per_m, sun_profile};
     to.cloud = {c.cloud_x, c.cloud_y, c.per_texel, c.ground_m};
     // real_per_drawn() is exponential in the diameter.
     const double at_0 = real_per_drawn(law, 0);
@@ -174,7 +175,7 @@ std::optional<RainData> rain_data(const RainFrame& rain, const Weather& weather,
     for (const RainCurtain& curtain : weather.curtains) {
         if (!falls(curtain)) continue;
         shader::SeenRain& seen = to.curtains[n] =
-            seen_rain(shafts.curtains[n], size_law(p.kind, p.intensity_scale * curtain.rate_mm_per_h));
+            seen_rain(shafts.curtains[n], shafts.sun_profile, size_law(p.kind, p.intensity_scale * curtain.rate_mm_per_h));
         if (const CloudBases* const cloud = curtain.cloud.get()) {
             if (!bases.contains(cloud)) bases[cloud] = add_bases(*cloud, data.bases);
             seen.bases[0] = bases[cloud];

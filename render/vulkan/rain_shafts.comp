@@ -108,6 +108,31 @@ float extinction(uint c, Way way, float rise, float t) {
     return contrast > 0.0 ? even * exp(4.5 * contrast * strands - 2.25 * contrast - 0.25 * contrast * contrast) : even;
 }
 
+// Returns the optical depth of one curtain from a point of the ray in it to the sun, 0 elsewhere.
+float depth_to_sun(uint c, Way way, float rise, float t) {
+    vec4 eye = rain.curtains[c].eye, sun = rain.curtains[c].sun;
+    vec2 at = t * way.unit + eye.xy;
+    float a = max(dot(sun.xy, sun.xy), 1.0e-14), b = dot(at, sun.xy), inside = 1.0 - dot(at, at);
+    float root = sqrt(max(b * b + a * inside, 0.0)), height_m = t * rise + eye.z;
+    float way_m = min((root - b) / a, (eye.w - height_m) / max(rain.to_sun.z, 1.0e-3));
+    if (!(inside > 0.0 && height_m >= 0.0 && way_m > 0.0)) return 0.0;
+    // The integral of (1 - r^2)^2 over way_m, divided by it.
+    float mean = way_m * (0.2 * a * a) + a * b;
+    mean = way_m * mean + 4.0 / 3.0 * b * b - 2.0 / 3.0 * a * inside;
+    mean = way_m * mean - 2.0 * inside * b;
+    mean = way_m * mean + inside * inside;
+    return max(sun.z * way_m * (sun.w * mean + 1.0 - sun.w), 0.0);
+}
+
+// Returns what the curtains around a point of the ray leave of the sun's light.
+float sun_left(vec3 ray, float t) {
+    float deepest = 0.0;
+    uint count = uint(rain.extra.z);
+    for (uint c = 0u; c < count; ++c)
+        if (tile_meets(c) && meets(c)) deepest = max(deepest, depth_to_sun(c, way_through(c, ray), ray.z, t));
+    return exp(-deepest);
+}
+
 // Finds the next interval of the union of the curtains' intersections after `run`.
 bool next_run(vec3 ray, inout vec2 run) {
     uint count = uint(rain.extra.z);
@@ -154,7 +179,8 @@ void march(vec3 ray, vec3 sun, vec3 horizon, vec2 part, float offset, inout vec4
         float depth = dot(densest, vec3(step_m)), weight = sum.a * (1.0 - exp(-depth));
         vec3 point = at.y * ray;
         float sunlight = rain.sun.w > 0.0 ? sunlight_at(point) : 0.0;
-        sum.rgb += weight * mix(horizon, particle_radiance(ray, point, sun, sunlight), kept);
+        vec3 lit = rain.sun.w > 0.0 ? sun_left(ray, at.y) * sun : sun;
+        sum.rgb += weight * mix(horizon, particle_radiance(ray, point, lit, sunlight), kept);
         sum.a -= weight;
     }
 }

@@ -74,7 +74,7 @@ const Section& precipitation_section() {
              "up to the cloud."),
          render_key<&RenderOptions::precipitation, &PrecipitationOptions::splashes>(
              "splashes", "", between(0, 10),
-             "Crowns and droplets where drops of more than 2 mm meet level ground or water within 30 m of the eye, as a "
+             "Crowns and droplets where drops of more than 2 mm meet ground or water within 30 m of the eye, as a "
              "multiple of their true number; 0: none.",
              "S, rain; Marshall and Palmer 1948")},
         nullptr};

@@ -356,10 +356,8 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
     if (scene.render.light.bows == 0 && scene.render.light.droplet_variance != CloudLight{}.droplet_variance)
         result.emplace_back("`light.droplet_variance` has no effect: `light.bows` is 0");
     const PrecipitationOptions& rain = scene.render.precipitation;
-    if (rain.splashes > 0 && (!rain.enabled || rain.kind == PrecipitationKind::snow || scene.render.terrain.any()))
-        result.emplace_back(
-            "`precipitation.splashes` has no effect: it needs rain (`enabled`, `kind`) and level ground, without a "
-            "`relief` or `height_map`");
+    if (rain.splashes > 0 && (!rain.enabled || rain.kind == PrecipitationKind::snow))
+        result.emplace_back("`precipitation.splashes` has no effect: it needs rain (`enabled`, `kind`)");
     add_terrain_keys(scene.render.terrain, result);
     add_background(scene, result);
     add_sections_of_automata(scene, result);

@@ -5,6 +5,7 @@
 #include "density/cloud_bases.h"
 
 #include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -113,10 +114,50 @@ TEST(CloudBases, OfPrimeSidesKeepToTheirTexelsAndTheirWater) {
     EXPECT_NEAR(row.rows * row.texel_m, 19'700, 1e-6);
 }
 
+// Two discs at different heights beside each other, and a gap: within a texel of the true underside.
+TEST(CloudBases, OfPiecesAreTheirUndersides) {
+    const std::vector<CloudPiece> pieces{{{0, 0, 1000}, 800, 400, 1}, {{2000, 0, 1600}, 800, 600, 0.5}};
+    const CloudBases bases = cloud_bases(pieces, {-1000, -1000}, {3000, 1000});
+    EXPECT_LE(bases.columns, CloudBases::kMostTexels);
+    EXPECT_NEAR(bases.at(0, 0).base_m, 800, 1);
+    EXPECT_NEAR(bases.at(0, 0).water, 1, 1e-2);
+    EXPECT_NEAR(bases.at(2000, 0).base_m, 1300, 1);
+    EXPECT_NEAR(bases.at(2000, 0).water, 0.5, 1e-2);
+    EXPECT_NEAR(bases.at(200, 0).base_m, 1000 - 200 * std::sqrt(0.75), 3);
+    EXPECT_NEAR(bases.at(200, 0).water, 0.75, 1e-2);
+    for (const double x_m : {-900.0, 450.0, 1000.0, 1550.0, 2950.0, 5000.0}) EXPECT_EQ(bases.at(x_m, 0).water, 0) << x_m;
+    EXPECT_EQ(bases.at(0, 450).water, 0);
+}
+
+// What covers other pieces adds its opacity; the lower one is the base, unless it is hardly there.
+TEST(CloudBases, OfPiecesAreThoseOfTheLowest) {
+    const CloudPiece high{{0, 0, 1500}, 800, 400, 0.5}, low{{0, 0, 900}, 800, 200, 0.5}, shred{{0, 0, 300}, 800, 100, 0.05};
+    const auto column = [](const std::vector<CloudPiece>& pieces) {
+        return cloud_bases(pieces, {-500, -500}, {500, 500}).at(0, 0);
+    };
+    EXPECT_NEAR(column({high, low}).base_m, 800, 1);
+    EXPECT_NEAR(column({low, high}).water, 0.75, 1e-2);
+    EXPECT_NEAR(column({high, shred}).base_m, 1300, 1);
+    EXPECT_NEAR(column({shred}).base_m, 250, 1);
+}
+
+// However many small pieces there are in a texel, they cover what they cover.
+TEST(CloudBases, OfPiecesSmallerThanATexelKeepTheirWater) {
+    std::vector<CloudPiece> pieces;
+    for (int n = 0; n < 100; ++n) pieces.push_back({{150.0 * n, 70.0 * (n % 7), 1000}, 40, 30, 0.5});
+    const CloudBases bases = cloud_bases(pieces, {-5000, -10'000}, {25'000, 10'000});
+    ASSERT_GT(bases.texel_m, 100);
+    double sum = 0;
+    for (const float water : bases.water) sum += double(water) * bases.texel_m * bases.texel_m;
+    const double each = 0.5 * 0.5 * std::numbers::pi * 20 * 20;  // the mean of 1 - r^2 is a half
+    EXPECT_NEAR(sum, 100 * each, 0.15 * 100 * each);
+}
+
 TEST(CloudBases, OfNothingAreDry) {
     EXPECT_EQ(cloud_bases(DensityGrid(), 0.05).columns, 0);
     EXPECT_EQ(cloud_bases(grid_of(std::vector<float>(kExtent.cells(), 0.0f)), 0.05).at(1250, -350).water, 0);
     EXPECT_EQ(CloudBases().at(0, 0).water, 0);
+    EXPECT_EQ(cloud_bases({}, {0, 0}, {1000, 1000}).at(500, 500).water, 0);
 }
 
 }  // namespace

@@ -103,6 +103,64 @@ TEST(RainShafts, HaveTheirOpticalDepth) {
     EXPECT_NEAR(left_of_rain(1, 0.3), 1, 1e-12);
 }
 
+// The profile through which the sun shines has the optical depth of the rain itself, without texture: on the mean of places all
+// over a leaning curtain, for each softness and height of the sun. The rain fades in at its top, which the profile leaves out.
+TEST(RainShafts, ShadeThemselvesAsMuchAsTheirRain) {
+    RainCurtain curtain = area();
+    curtain.lean_x = 0.3;
+    RenderOptions options = options_at({-400, -900, 20}, {100, 900, 300});
+    options.precipitation.shaft_texture = 0;
+    const Picture picture = test::grey(options.camera, 0.2f);
+    for (const double edge : {0.0, 0.6, 0.8, 1.0}) {
+        for (const double elevation_deg : {3.0, 20.0, 50.0}) {
+            options.precipitation.edge = edge;
+            options.sun.elevation_deg = elevation_deg;
+            const PrecipitationLight light = precipitation_light(picture, options, 0);
+            const reference::Shafts twin{picture, options, camera_frame(options.camera), {&curtain, 1}, light, 0,
+                                         shaft_noise(5), reference::whole_per_m(options.precipitation, {&curtain, 1})};
+            double rain = 0, shade = 0;
+            for (const double u : {-0.9, -0.5, 0.0, 0.4, 0.8}) {
+                for (const double height_m : {10.0, 200.0, 400.0}) {
+                    const Ellipse at = ellipse_at(curtain, height_m);
+                    const Vec3 place{at.x_m + u * at.semi_a_m * at.axis_x, at.y_m + u * at.semi_a_m * at.axis_y, height_m};
+                    shade += reference::depth_to_sun(twin, curtain, twin.whole_per_m[0], place);
+                    constexpr int kSteps = 2000;
+                    const double step_m = (curtain.base_m - height_m) / light.to_sun.z / kSteps;
+                    for (int n = 0; n < kSteps; ++n)
+                        rain += step_m * reference::extinction(twin, curtain, twin.whole_per_m[0],
+                                                               place + (n + 0.5) * step_m * light.to_sun);
+                }
+            }
+            EXPECT_NEAR(shade / rain, 1, elevation_deg < 45 ? 0.15 : 0.25) << edge << ", " << elevation_deg;
+        }
+    }
+}
+
+// A face of heavy rain that is in the sun is bright, one that the rain itself shades is dark; thin rain is as bright on both
+// sides, but for its phase function.
+TEST(RainShafts, AreDarkerFarFromTheSun) {
+    RainCurtain curtain = area();
+    curtain.rate_mm_per_h = 60;
+    RenderOptions options = options_at({100, -3000, 300}, {100, 900, 300});
+    options.precipitation.shaft_texture = 0;
+    options.camera.vertical_fov_deg = 20;
+    options.sun.elevation_deg = 10;
+    options.air.extinction_per_m = {0, 0, 0};
+    const CameraFrame camera = camera_frame(options.camera);
+    const auto middle = [&](double sun_azimuth_deg, double rate_mm_per_h) {
+        options.sun.azimuth_deg = sun_azimuth_deg;
+        curtain.rate_mm_per_h = rate_mm_per_h;
+        Picture picture = test::grey(options.camera, 0.0f);
+        PrecipitationLight light = precipitation_light(picture, options, 0);
+        light.by_sky = light.by_scattered_sun = light.by_sunlit_ground = {};
+        light.kind = PrecipitationKind::snow;  // without bows
+        draw_shafts(picture, options, camera, {&curtain, 1}, light, 0, 5);
+        return double(picture.beauty[3 * (15 * 77 + 38)]);
+    };
+    const double behind_thin = middle(0, 2), behind = middle(0, 200), before_thin = middle(180, 2), before = middle(180, 200);
+    EXPECT_GT(before / before_thin, 2 * behind / behind_thin);
+}
+
 // Three curtains, two of which overlap and the third behind them, all leaning in their own ways; from
 // outside, from within, from above, steeply and level, with all that light them.
 TEST(RainShafts, AreThoseOfTheTwin) {

@@ -119,9 +119,37 @@ inline std::vector<Stretch> stretches(const Shafts& s, const Vec3& ray) {
     return joined;
 }
 
+// Optical depth of the ray to the sun in the curtain that it begins in, in steps.
+inline double depth_to_sun(const Shafts& s, const RainCurtain& c, double whole_per_m, const Vec3& place) {
+    constexpr int kSteps = 200;
+    if (!(c.base_m > c.ground_m) || !(c.rate_mm_per_h > 0)) return 0;
+    const double edge = s.options.precipitation.edge, softness = edge > 0 ? std::max(edge, kShaftSoftest) : 0,
+                 profile = sun_profile(softness);
+    const Vec3& to_sun = s.light.to_sun;
+    const double far_m = (c.base_m - place.z) / std::max(to_sun.z, 1e-3);
+    if (place.z < c.ground_m || ellipse_value(ellipse_at(c, place.z), place.x, place.y) >= 1) return 0;
+    double depth = 0;
+    for (int n = 0; n < kSteps; ++n) {
+        const Vec3 at = place + (n + 0.5) / kSteps * far_m * to_sun;
+        const double r2 = ellipse_value(ellipse_at(c, at.z), at.x, at.y);
+        if (r2 < 1) depth += (1 - profile + profile * (1 - r2) * (1 - r2)) * far_m / kSteps;
+    }
+    return whole_per_m * mean_water(c) * depth;
+}
+
+// The light with what the curtains around a place leave of the sun.
+inline PrecipitationLight light_at(const Shafts& s, const Vec3& place) {
+    PrecipitationLight light = s.light;
+    double deepest = 0;
+    for (std::size_t n = 0; n < s.curtains.size(); ++n)
+        deepest = std::max(deepest, depth_to_sun(s, s.curtains[n], s.whole_per_m[n], place));
+    for (double& channel : light.sun) channel *= std::exp(-deepest);
+    return light;
+}
+
 inline Rgb arriving(const Shafts& s, const Vec3& ray, double t) {
     const Vec3 place = s.camera.position_m + t * ray;
-    const Rgb own = particle_radiance(s.light, ray, place, double(sunlight_at(s.picture, place)));
+    const Rgb own = particle_radiance(light_at(s, place), ray, place, double(sunlight_at(s.picture, place)));
     const PictureAir air = air_of(s.picture, s.options);
     const Vec3 to_sun = s.light.to_sun;
     const double level = std::sqrt((ray.x * ray.x + ray.y * ray.y) * (to_sun.x * to_sun.x + to_sun.y * to_sun.y));

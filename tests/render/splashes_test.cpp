@@ -117,7 +117,7 @@ TEST(Splashes, AreAFunctionOfTimeAndSeed) {
     EXPECT_EQ(same, 0u);
 }
 
-TEST(Splashes, NeedRainAndLevelGroundNearTheEye) {
+TEST(Splashes, NeedRainAndKnownGroundNearTheEye) {
     const Weather weather = rain_of(10);
     const auto number = [&](RenderOptions options, const Weather& of) {
         return splashes_at(frame_of(options, 5), of).size();
@@ -145,11 +145,41 @@ TEST(Splashes, NeedRainAndLevelGroundNearTheEye) {
     EXPECT_LT(weight(edge), 0.7 * weight(weather));
 }
 
+// On relief they lie on it: as many as on level ground for the same area of map, and none on a wall.
+TEST(Splashes, LieOnReliefButNotOnWalls) {
+    RenderOptions options = view(kDown);
+    options.terrain.relief = Relief::hills;
+    options.camera.position_m.z = options.camera.target_m.z = 101.7;
+    options.camera.target_m.z -= 1;
+    Weather weather = rain_of(10);
+    // Ground that rises to the east, with a wall of 10 m from 3 to 4 m east of the eye.
+    const auto surface = [](double x_m, double) {
+        const double east_m = x_m - kEye.x, wall = std::clamp(east_m - 3, 0.0, 1.0);
+        return GroundSurface{100 + 0.3 * east_m + 10 * wall, wall > 0 && wall < 1 ? 10.3 : 0.3, 0};
+    };
+    EXPECT_TRUE(splashes_at(frame_of(options, 5), weather).empty()) << "how the relief lies is not known";
+    weather.relief = surface;
+    double low = 0, beyond = 0;
+    for (int n = 0; n < 5; ++n) {
+        for (const Splash& each : splashes_at(frame_of(options, 5 + 1.7 * n), weather)) {
+            const double east_m = each.x_m - kEye.x;
+            EXPECT_DOUBLE_EQ(each.ground.z_m, surface(each.x_m, each.y_m).z_m);
+            EXPECT_FALSE(east_m > 3 && east_m < 4) << "on the wall";
+            if (east_m < 0 && distance_of(each) < 5) low += each.weight;
+            if (east_m > 5) ++beyond;
+        }
+    }
+    const double per_m2 = throwing_drops(size_law(PrecipitationKind::rain, 10)) * kSplashPeriod_s;
+    const double expected = 5 * per_m2 * 0.5 * std::numbers::pi * 25;
+    EXPECT_NEAR(low, expected, 0.15 * expected);
+    EXPECT_EQ(beyond, 0) << "above the eye, which looks down";
+}
+
 // A crown stands where its drop fell and is gone before the droplets land, which fly outwards and down again.
 TEST(Splashes, AreCrownsAndThenDroplets) {
     const RainFrame frame = frame_of(view(kAhead), 5);
     const auto streaks = [&](double age_s) {
-        return streaks_of_splashes(frame, {Splash{kEye.x, kEye.y + 3, age_s, 1, 0.3, 0.8}});
+        return streaks_of_splashes(frame, {Splash{kEye.x, kEye.y + 3, {}, age_s, 1, 0.3, 0.8}});
     };
     const PixelPosition impact = project(frame.camera, frame.options.camera, {kEye.x, kEye.y + 3, 0});
     const std::vector<Streak> young = streaks(0.03), flying = streaks(0.1), gone = streaks(0.29);

@@ -124,6 +124,49 @@ TEST(RainOfAFrame, BeginsInTheMiddleOfTheBasesWithoutDensity) {
     EXPECT_NEAR(below.curtains[0].base_m, 850, 1);
 }
 
+// A sky of clouds of one billboard each, 600 m wide and 300 m high, their middles at 1000 m.
+SkyOptions billboards() {
+    BaseModel model;
+    model.name = "one";
+    Seed seed;
+    seed.size_m = {1, 1, 1};
+    seed.billboards = {1, 1};
+    seed.billboard_width_m = {600, 600};
+    seed.billboard_height_m = {300, 300};
+    model.seeds = {seed};
+    SkyOptions options;
+    options.world = {-20'000, -20'000, 20'000, 20'000};
+    options.models = {model};
+    options.skies = {{"only", 0, 4, {{0, 1}}}};
+    options.base_height_m = {1000, 1000};
+    return options;
+}
+
+// Of clouds that are drawn directly: below each billboard from its underside, and none beside it.
+TEST(RainOfAFrame, BeginsAtTheBillboardsOfALayerWithoutVoxels) {
+    const Scene scene = read_scene_text(kScene, "rain.toml");
+    const SkySimulation sky(billboards());
+    LayerFrame frame;
+    frame.sky = &sky;
+    frame.clouds.assign(sky.clouds().begin(), sky.clouds().begin() + 1);
+    frame.direct = true;
+    const Vec3 cloud = sky.position_m(frame.clouds.front());
+    frame.rain = {area_at(cloud.x, cloud.y), area_at(cloud.x + 250, cloud.y), area_at(cloud.x + 900, cloud.y)};
+    const Weather weather = weather_of(scene, std::vector{frame}, {}, 0);
+    ASSERT_EQ(weather.curtains.size(), 2u) << "none where no billboard is above";
+    for (const RainCurtain& curtain : weather.curtains) {
+        ASSERT_NE(curtain.cloud, nullptr);
+        EXPECT_NEAR(cloud_above(curtain, {cloud.x, cloud.y, 100}).base_m, 850, 2);
+        EXPECT_NEAR(cloud_above(curtain, {cloud.x + 200, cloud.y, 100}).base_m, 1000 - 150 * std::sqrt(5.0) / 3, 10);
+        EXPECT_GT(cloud_above(curtain, {cloud.x, cloud.y, 100}).water, 0.95);
+        EXPECT_EQ(cloud_above(curtain, {cloud.x + 330, cloud.y, 100}).water, 0);
+    }
+    EXPECT_LE(weather.curtains[0].base_m, 1001);
+    // A cloud that has hardly formed has no rain.
+    frame.clouds.front().phase = 0;
+    EXPECT_TRUE(weather_of(scene, std::vector{frame}, {}, 0).curtains.empty());
+}
+
 // The pixel of a place, in a picture that it lies in.
 std::array<double, 2> pixel_of(const Camera& camera, const Vec3& place_m) {
     const CameraFrame view = camera_frame(camera);
