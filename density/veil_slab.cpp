@@ -18,6 +18,7 @@ namespace {
 static_assert(VeilSlab::kPointLanes == kVeilLanes);
 
 constexpr std::size_t kBatch = 512;  // points, a multiple of kVeilLanes
+constexpr double kLeastRefinement = 0.8;  // of wavelengths, from an octave to a finer one
 constexpr float kLeastDensity = 0x1p-10f;
 constexpr float kStepVariance = 1.0f / 20;  // of the bell whose integral is smoothstep(), per squared width
 
@@ -37,16 +38,35 @@ float nearest(float offset_m, double period_m) {
     return period_m > 0 ? float(std::remainder(double(offset_m), period_m)) : offset_m;
 }
 
+// How an octave follows from the one before: by the powers of the options, or as the last octave of a list follows from
+// the last but one if it is finer, in no direction coarser, and weighs less.
+struct Progression {
+    Vec3 wavelength{1, 1, 1};
+    double displacement = 1, weight = 1;
+};
+
+Progression progression_of(const VeilOptions& options) {
+    const Progression powers{Vec3(1 / options.lacunarity), 1 / options.lacunarity, options.persistence};
+    if (options.octaves.size() < 2) return powers;
+    const VeilOctave &last = options.octaves.back(), &before = options.octaves[options.octaves.size() - 2];
+    const Vec3 ratio = last.wavelength_m / before.wavelength_m;
+    const double finer = std::min({ratio.x, ratio.y, ratio.z}), coarser = std::max({ratio.x, ratio.y, ratio.z});
+    const double weight = last.weight / before.weight;
+    if (!(finer <= kLeastRefinement && coarser <= 1 && weight > 0 && weight < 1)) return powers;
+    return {ratio, finer, weight};
+}
+
 // The options with finer octaves after theirs, as many as fit.
 VeilOptions refined(const VeilOptions& options, int finer_octaves) {
     VeilOptions finer = options;
     finer.octaves = veil_octaves(options);
+    const Progression next = progression_of(options);
     for (int n = 0; n < finer_octaves; ++n) {
         VeilOctave octave = finer.octaves.back();
-        octave.wavelength_m = octave.wavelength_m / options.lacunarity;
-        octave.displacement_m = octave.displacement_m / options.lacunarity;
+        octave.wavelength_m = octave.wavelength_m * next.wavelength;
+        octave.displacement_m = octave.displacement_m * next.displacement;
         octave.velocity_m_per_s = 0.8 * octave.velocity_m_per_s;
-        octave.weight *= options.persistence;
+        octave.weight *= next.weight;
         if (!fits_the_tile(octave, options)) break;
         finer.octaves.push_back(octave);
     }

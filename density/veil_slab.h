@@ -32,7 +32,8 @@ class VeilSlab {
     static constexpr int kMostFinerOctaves = 12;
 
     // `finer_octaves`: how many octaves follow those of the options, each finer than the one before by `lacunarity`, with
-    // `persistence` of its weight; 0..kMostFinerOctaves. In a tile those are left out whose lattices would have more than
+    // `persistence` of its weight, or as the last two octaves of a list go on, in each direction: so those of fibres of one
+    // length are threads. 0..kMostFinerOctaves. In a tile those are left out whose lattices would have more than
     // kMostVeilCells cells in it (veil_lattice.h). Without `sides` the veil has no end. Throws Error(usage) when
     // finer_octaves is out of range, time_s is not finite or above 1e9.
     VeilSlab(const VeilOptions& options, const Wind& wind, double time_s, int finer_octaves,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/frame_writer.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -81,6 +82,13 @@ VdbMetadata FrameWriter::metadata_of(const FrameResult& frame, const StateHash& 
     return metadata;
 }
 
+// Whether fields of wind move the voxels of a file: a layer's, or those of all. Veils move with the profile alone.
+bool moves_with_fields(const Scene& scene, std::optional<std::size_t> layer) {
+    const auto moves = [](const LayerOptions& of) { return !of.is_veil; };
+    if (layer) return moves(scene.layers[*layer]);
+    return scene.layers.empty() || std::ranges::any_of(scene.layers, moves);
+}
+
 // The digest of the file is that of its bytes as they are read back.
 WrittenFile FrameWriter::write(const FrameResult& frame, VdbContent content, std::optional<std::size_t> layer) const {
     const DensityGrid& density = *content.density;
@@ -89,7 +97,7 @@ WrittenFile FrameWriter::write(const FrameResult& frame, VdbContent content, std
         content.wind = wind_of_levels(scene_, layer, density.placement(), density.extent(), frame.time_s);
         content.wind_name = scene_.density_files.velocity_name;
         const std::vector<WindField>& fields = scene_.automaton.wind.fields;
-        if (!fields.empty())
+        if (!fields.empty() && moves_with_fields(scene_, layer))
             content.wind_field = [&fields, time_s = frame.time_s](const Vec3& place_m) {
                 return velocity_of(fields, place_m, time_s);
             };

@@ -11,7 +11,9 @@
 namespace nephos {
 namespace {
 
-constexpr double kStepPerFinest = 0.5, kStepPixels = 1.5;  // of samples along a ray
+constexpr double kStepPerFinest = 0.5;  // of samples along a ray
+// Steps in pixels: longer ones of physical light show threads with a moire; S's light depends on their length.
+constexpr double kStepPixels = 0.75, kStepPixelsOfTwoSamples = 1.5;
 // A sample stands for this part of the step to the next one: what is finer is not resolved along the ray.
 constexpr double kFootprintPerStep = 0.6;
 constexpr int kFewestSamples = 4;
@@ -43,7 +45,8 @@ SampleGroup::SampleGroup(const Sheet& sheet, const Vec3& eye_m, std::vector<Seen
 void SampleGroup::add(std::size_t pixel, const Ray& ray, const RayPart& part) {
     const DrawnVeil& veil = *sheet_.veil;
     const double length = part.end - part.begin, middle = 0.5 * (part.begin + part.end);
-    const double wanted = std::max(kStepPerFinest * veil.slab->finest_m(), kStepPixels * sheet_.per_pixel * middle);
+    const double pixels = veil.view.light == VeilLighting::two_samples ? kStepPixelsOfTwoSamples : kStepPixels;
+    const double wanted = std::max(kStepPerFinest * veil.slab->finest_m(), pixels * sheet_.per_pixel * middle);
     const bool follows = !runs_.empty() && runs_.back().pixel == pixel;
     if (!follows && runs_.size() >= kRuns) flush();
     Run& run = runs_.emplace_back();

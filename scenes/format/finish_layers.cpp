@@ -217,15 +217,27 @@ void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& laye
     }
 }
 
+// Returns the heights of bases of a genus, world z: those above the ground in the scene's region, and the ground's.
+Range bases_of_genus(const Entry& genus, const Scene& scene) {
+    const Range above_ground = base_height_m(genus_from_name(genus.value.text), scene.climate.region);
+    const double ground_m = scene.render.ground.height_m;
+    return {above_ground.min + ground_m, above_ground.max + ground_m};
+}
+
+// Returns the heights between which the layer's lattice lies, as messages give them.
+std::string heights_of_lattice(const LayerOptions& layer) {
+    const double bottom = layer.placement.origin_m.z;
+    const double top = bottom + layer.extent.z * layer.placement.cell_size_m;
+    return number_text(bottom) + " to " + number_text(top) + " m of its lattice";
+}
+
 // Base heights: those of the file, or of the genus as far as they lie in the lattice.
 void fill_in_base_height(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
     const double bottom = layer.placement.origin_m.z;
     const double top = bottom + layer.extent.z * layer.placement.cell_size_m;
-    const std::string lattice_text = number_text(bottom) + " to " + number_text(top) + " m of its lattice";
+    const std::string lattice_text = heights_of_lattice(layer);
     if (const Entry* genus = reader.find("genus")) {
-        const Range above_ground = base_height_m(genus_from_name(genus->value.text), scene.climate.region);
-        const double ground_m = scene.render.ground.height_m;
-        const Range heights{above_ground.min + ground_m, above_ground.max + ground_m};
+        const Range heights = bases_of_genus(*genus, scene);
         layer.base_height_m = heights;
         if (!layer.automaton) return;
         layer.base_height_m = {std::max(heights.min, bottom), std::min(heights.max, top)};
@@ -279,12 +291,50 @@ void check_presence(const SectionReader& reader, const LayerOptions& layer) {
     }
 }
 
+// Reports a veil's base that is none of its genus.
+void check_base_of_genus(const SectionReader& reader, const Entry& genus, const Scene& scene, double base_m) {
+    const Range heights = bases_of_genus(genus, scene);
+    if (base_m >= heights.min && base_m <= heights.max) return;
+    const SectionReader veil = below(reader, "veil");
+    veil.report("base_m",
+                veil.quoted("base_m") + " is " + number_text(base_m) + "; bases of " + genus.value.text +
+                    " lie from " + number_text(heights.min) + " to " + number_text(heights.max) + " m",
+                "expected one of these heights, none, or no `genus`");
+}
+
+// Places a veil without `base_m` in the middle of the heights of its genus, and there a lattice that has no place of
+// its own.
+void place_by_genus(const SectionReader& reader, const Entry& genus, const Scene& scene, LayerOptions& layer) {
+    const Range heights = bases_of_genus(genus, scene);
+    const double base_m = (heights.min + heights.max) / 2;
+    layer.veil.base_m = base_m;
+    double& bottom = layer.placement.origin_m.z;
+    if (!below(reader, "lattice").find("origin_m")) bottom = base_m;
+    if (base_m >= bottom && base_m < bottom + layer.extent.z * layer.placement.cell_size_m) return;
+    reader.report("genus",
+                  "the base of a veil of " + genus.value.text + ", the middle of " + number_text(heights.min) +
+                      " to " + number_text(heights.max) + " m, is outside the " + heights_of_lattice(layer),
+                  "expected a lattice that reaches this height, one without `origin_m`, or `veil.base_m`");
+}
+
+// Fills in the heights of a veil: those of the file, of its genus, or of the lattice.
+void fill_in_heights_of_veil(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
+    const SectionReader veil = below(reader, "veil");
+    const Entry* genus = reader.find("genus");
+    const bool has_base = veil.find("base_m") != nullptr;
+    if (genus && has_base) check_base_of_genus(reader, *genus, scene, layer.veil.base_m);
+    if (genus && !has_base) place_by_genus(reader, *genus, scene, layer);
+    const double bottom = layer.placement.origin_m.z;
+    if (!genus && !has_base) layer.veil.base_m = bottom;
+    if (!veil.find("top_m")) layer.veil.top_m = bottom + layer.extent.z * layer.placement.cell_size_m;
+}
+
 // Finishes a layer that is a veil: defaults by its lattice and wind, and keys without effect.
 void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
     for (const std::string_view key : keys_of_clouds()) {
         if (reader.find(key) == nullptr) continue;
         reader.report(key, reader.quoted(key) + " stands beside `veil`",
-                      "expected `name`, `opacity`, `lattice`, `wind`, `presence`, `veil`, `slab` and "
+                      "expected `name`, `genus`, `opacity`, `lattice`, `wind`, `presence`, `veil`, `slab` and "
                       "`detail` alone: a veil has no "
                       "clouds and no automaton");
     }
@@ -299,9 +349,7 @@ void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOpt
     }
     fill_in_lattice(reader, scene, layer);
     if (scene.tile) layer.boundaries = {Boundary::periodic, Boundary::periodic, Boundary::open};
-    const double bottom = layer.placement.origin_m.z;
-    if (!veil.find("base_m")) layer.veil.base_m = bottom;
-    if (!veil.find("top_m")) layer.veil.top_m = bottom + layer.extent.z * layer.placement.cell_size_m;
+    fill_in_heights_of_veil(reader, scene, layer);
     if (veil.find("direction_deg")) return;
     const Wind& wind = layer.wind.keyframes.empty() ? scene.automaton.wind : layer.wind;
     const Velocity velocity = wind_at(wind, layer.veil.top_m, 0);

@@ -375,7 +375,8 @@ const Section& layer_section() {
         Key genus =
             plain_key(KeyKind::word, "genus", {}, {},
                       "Instead of `base_height_m`: the heights of this genus in `climate.region` above "
-                      "`ground.height_m`, as far as they lie in the lattice.",
+                      "`ground.height_m`, as far as they lie in the lattice. The base of a veil is their middle if "
+                      "it has no `base_m`, and so is the bottom of its lattice if that has no `origin_m`.",
                       "T, 2");
         for (const GenusFacts& facts : genera()) genus.words.push_back(facts.abbreviation);
         Section layers{
@@ -487,7 +488,7 @@ const Section& layer_section() {
 
 std::span<const std::string_view> keys_of_clouds() {
     static constexpr std::string_view kKeys[] = {
-        "skies",    "automaton",     "background",    "base_height_m",      "genus",
+        "skies",    "automaton",     "background",    "base_height_m",
         "climate",  "formation_s",   "dissolution_s", "formation_softness", "cross_edges_whole",
         "coupling", "rain",          "scatters",      "ellipsoids",         "profile",
         "entering", "metamorphoses", "shear_s",       "light_absorption"};

@@ -62,7 +62,8 @@ const Section& slab_section() {
                                 "Steps of a ray, at most; those where the veil is dense are divided."),
          key<&VeilView::finer_octaves>(
              "finer_octaves", "", between(0, 12),
-             "Octaves after those of the veil, by its `lacunarity` and `persistence`: they "
+             "Octaves after those of the veil, by its `lacunarity` and `persistence`, or as the last two of a list "
+             "go on, each direction by itself, where the last is finer, in none coarser, and weighs less. They "
              "may be finer than cells. In a tile those with more than 1048576 cells of noise in it are left out.",
              "S, eq. 4"),
          key<&VeilView::to_horizon>(

@@ -145,7 +145,7 @@ const Section& veil_section() {
                                      "Density everywhere in the layer, below that of the pattern."));
         add(default_is(
             key<&VeilOptions::base_m>("base_m", "m", kHeight, "Height above which there is a veil."),
-            "the bottom of the layer's lattice"));
+            "the middle of the heights of the layer's `genus`, without it the bottom of the layer's lattice"));
         add(default_is(key<&VeilOptions::top_m>("top_m", "m", kHeight,
                                                 "Height below which there is a veil; the wind at this height "
                                                 "carries it."),

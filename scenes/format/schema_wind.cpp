@@ -63,7 +63,7 @@ const Section& level_section() {
         "first "
         "and above the last constant.",
         {required(key<&WindLevel::height_m>("height_m", "m", between(-kFarthest_m, kFarthest_m),
-                                            "Height above the ground; levels rise.", "D, advection")),
+                                            "Height of the world, as `ground.height_m` is; levels rise.", "D, advection")),
          key<&WindLevel::velocity, &Velocity::east_m_per_s>("east_m_per_s", "m/s", kSpeed,
                                                             "Velocity towards east."),
          key<&WindLevel::velocity, &Velocity::north_m_per_s>("north_m_per_s", "m/s", kSpeed,

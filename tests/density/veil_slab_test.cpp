@@ -128,6 +128,30 @@ TEST(VeilSlab, FinerOctavesKeepTheCover) {
               VeilSlab(options, steady_wind(), 0, 0, {}).finest_m() / 15);
 }
 
+// Finer octaves go on as the last two of a list do: threads of one length vary along the fibres no faster than the
+// octaves of the list, and across them as fast as those by powers do.
+TEST(VeilSlab, FinerOctavesOfFibresAreThreads) {
+    VeilOptions options = veil_of(VeilForm::stratus);
+    options.fallstreak_m = 0;
+    options.direction_deg = 0;
+    options.softness = options.coverage = 1;
+    const auto roughness = [&](const Vec3& last_m, const Vec2& step) {
+        options.octaves = {{.wavelength_m = {4000, 2000, 4000}, .weight = 1}, {.wavelength_m = last_m, .weight = 0.8}};
+        const VeilSlab slab(options, steady_wind(), 0, 3, {});
+        Places here = level_of_points(0), there;
+        for (std::size_t n = 0; n < here.x.size(); ++n)
+            there.add(double(here.x[n]) + step.x, double(here.y[n]) + step.y, double(here.z[n]), 0);
+        const std::vector<float> a = here.densities(slab, {}), b = there.densities(slab, {});
+        double sum = 0;
+        for (std::size_t n = 0; n < a.size(); ++n) sum += double(std::abs(b[n] - a[n]));
+        return sum / double(a.size());
+    };
+    const Vec3 threads{4000, 1000, 4000}, grains{2000, 1000, 2000};
+    const Vec2 along{60, 0}, across{0, 60};
+    EXPECT_LT(roughness(threads, along), 0.4 * roughness(grains, along));
+    EXPECT_NEAR(roughness(threads, across) / roughness(grains, across), 1, 0.25);
+}
+
 TEST(VeilSlab, EndsAtItsSides) {
     VeilOptions options = veil_of(VeilForm::stratus);
     options.sheet = 1;

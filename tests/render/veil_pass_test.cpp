@@ -17,6 +17,7 @@
 #include "render/renderer.h"
 #include "render/veil/sheet_light.h"
 #include "render/veil/slab_path.h"
+#include "render/veil/veil_samples.h"
 
 namespace nephos {
 namespace {
@@ -190,6 +191,54 @@ TEST(VeilPass, ThickSheetsAreBrightAboveAndDarkBelow) {
         EXPECT_LT(dark.beauty[3 * kMiddle + 1], 0.6f * lit.beauty[3 * kMiddle + 1]) << int(lighting);
         EXPECT_GT(dark.beauty[3 * kMiddle + 1], 0.05f * lit.beauty[3 * kMiddle + 1]) << int(lighting);
     }
+}
+
+// S's light of one ray, worked out sample by sample as S writes it, with the vectors themselves: straight up through a
+// level veil of density 1 between 1 and 2 km, in four samples, whose factor by height is 1/2 at the base and 3/2 at the
+// top. Towards the sun, 30 degrees high, the second sample is 120 m higher, so that the densities differ by 0.12 and
+// df = (0.5 (-0.12) + 0.31)^2 = 1/16; h . v = 1/2, so that C_d = 3 (1 - 1/2)^2 = 3/4 of the sun's light.
+TEST(VeilPass, TwoSampleLightIsThatOfAScalarTwin) {
+    DrawnVeil veil = even_sheet(1000, 2000, 0.0004, VeilLighting::two_samples);
+    veil.view.samples = 4;
+    veil.view.height_slope = veil.view.height_offset = 1;
+    veil.view.two_samples = {.sun_step_m = 240,
+                             .shade_gain = 0.5,
+                             .shade_offset = 0.31,
+                             .shade_power = 2,
+                             .glow_gain = 3,
+                             .glow_power = 2,
+                             .bounce_power = 2};
+    Sheet sheet;
+    sheet.veil = &veil;
+    sheet.base_m = 1000;
+    sheet.top_m = 2000;
+    sheet.to_sun = {std::sqrt(0.75), 0, 0.5};
+    sheet.sun_cosine = 0.5;
+    sheet.sun = {8, 6, 4};
+    sheet.sky = {1, 2, 3};
+    sheet.ground = {0.5, 0.25, 0.125};
+    std::vector<SeenVeil> seen(1);
+    SampleGroup group(sheet, {}, seen);
+    group.add(0, {0, 0, 1}, {1000, 2000});
+    group.flush();
+
+    const Vec3 to_viewer{0, 0, -1}, half = glm::normalize(sheet.to_sun + to_viewer);
+    const double glow = 3 * std::pow(1 - glm::dot(half, to_viewer), 2), df = std::pow(0.5 * -0.12 + 0.31, 2);
+    EXPECT_NEAR(glow, 0.75, 1e-12);
+    EXPECT_NEAR(df, 1.0 / 16, 1e-12);
+    Rgb expected{};
+    double left = 1;
+    for (const double gr : {0.125, 0.375, 0.625, 0.875}) {
+        const double covers = left * (gr + 0.5) * 0.0004 * 250;  // a mu dp
+        for (std::size_t c = 0; c < 3; ++c) {
+            const double around = std::lerp(sheet.sky[c], sheet.sun[c], gr), direct = glow * sheet.sun[c];
+            expected[c] += covers * (std::lerp(around, direct, df) + sheet.ground[c] * (1 - gr) * (1 - gr));
+        }
+        left -= covers;
+    }
+    EXPECT_NEAR(seen[0].transmittance, left, 1e-6);
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(seen[0].light[c], expected[c], 1e-5) << c;
+    EXPECT_NEAR(seen[0].light[0], 1.747888, 1e-5);  // worked out by hand
 }
 
 // Where the density is scaled by height, light and shadow are those of the scaled one.

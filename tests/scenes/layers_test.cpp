@@ -335,6 +335,45 @@ TEST(Layers, GeneraLieAboveTheGround) {
               (Range{polar.min + 700, polar.max + 700}));
 }
 
+// A veil, too, has the heights of its genus: its base lies in their middle, and its lattice with it, unless the scene
+// says where they lie.
+TEST(Layers, VeilsLieAtTheHeightsOfTheirGenus) {
+    const auto layer = [](std::vector<std::string> overrides) {
+        return read_scene_text("[[layer]]\nname = \"a\"\ngenus = \"Ci\"\n"
+                               "[layer.lattice]\ncells = [8, 8, 10]\ncell_size_m = 200\n"
+                               "[layer.veil]\nwavelength_m = 6000\n[layer.slab]\n",
+                               "veil.toml", {}, overrides)
+            .layers.front();
+    };
+    const auto expect = [](const LayerOptions& of, double bottom_m, double base_m, double top_m) {
+        EXPECT_EQ(of.placement.origin_m.z, bottom_m);
+        EXPECT_EQ(of.veil.base_m, base_m);
+        EXPECT_EQ(of.veil.top_m, top_m);
+    };
+    expect(layer({}), 9000, 9000, 11'000);                      // 5 to 13 km
+    expect(layer({"climate.region=polar"}), 5500, 5500, 7500);  // 3 to 8 km
+    expect(layer({"climate.region=polar", "ground.height_m=700"}), 6200, 6200, 8200);
+    expect(layer({"layer[0].veil.top_m=9800"}), 9000, 9000, 9800);
+    expect(layer({"layer[0].lattice.origin_m=[0,0,8400]"}), 8400, 9000, 10'400);
+    expect(layer({"layer[0].lattice.origin_m=[0,0,8400]", "layer[0].veil.base_m=8500"}), 8400, 8500, 10'400);
+
+    const auto message = [&](std::vector<std::string> overrides) -> std::string {
+        try {
+            layer(std::move(overrides));
+        } catch (const Error& error) {
+            return error.what();
+        }
+        return "no error";
+    };
+    const std::string outside = message({"layer[0].lattice.origin_m=[0,0,5000]"});
+    EXPECT_TRUE(outside.starts_with("veil.toml:3:9: error: the base of a veil of Ci, the middle of 5000 to 13000 m, is "
+                                    "outside the 5000 to 7000 m of its lattice\n 3 | genus = \"Ci\"\n   |         ^\n"))
+        << outside;
+    const std::string other = message({"climate.region=polar", "layer[0].veil.base_m=8500"});
+    EXPECT_NE(other.find("`layer[0].veil.base_m` is 8500; bases of Ci lie from 3000 to 8000 m"), std::string::npos)
+        << other;
+}
+
 // Between two steps a cloud moves on a straight line that ends where the step puts it.
 TEST(Layers, CloudsMoveOnContinuouslyBetweenSteps) {
     const Scene scene = read_scene_text(kTwoLayers, "two.toml");

@@ -4,6 +4,7 @@
 
 #include "simulation/scene_files.h"
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -19,6 +20,7 @@
 #include "scenes/format/errors.h"
 #include "scenes/format/reader.h"
 #include "simulation/billboard_files.h"
+#include "simulation/frame_writer.h"
 #include "simulation/layer_simulation.h"
 #include "simulation/simulation.h"
 
@@ -119,6 +121,37 @@ TEST_F(SceneFiles, TheVelocityGridHasTheField) {
         const Vec3 place = scene.automaton.placement.origin_m + 50.0 * (index + 0.5), expected = wind_at(wind, place, 0);
         for (int part = 0; part < 3; ++part) EXPECT_NEAR(sample_at(grid, place, part), expected[part], 1e-6);
     }
+}
+
+// Veils do not move with fields, so their velocity grid has the profile alone; the layer beside it has both.
+TEST_F(SceneFiles, TheVelocityGridOfAVeilIsTheProfile) {
+    const Scene scene = read(
+        "[density]\nwrite_velocity = true\n[[wind]]\nlevels = [{ height_m = 0, north_m_per_s = 3 }]\n"
+        "[[wind_field]]\nkind = \"vortex\"\nx_m = 1000\ny_m = 800\nradius_m = 400\nspeed_m_per_s = 6\n"
+        "[[model]]\nname = \"Cu\"\nseeds = [{ size_m = [400, 400, 200] }]\n"
+        "[[sky]]\nname = \"fair\"\nstate = 0\nclouds = 6\nmodels = \"Cu\"\n"
+        "[[layer]]\nname = \"Cu\"\nskies = \"fair\"\nbase_height_m = 300\n"
+        "background = { hum = 0.5, act = 0.5, ext = 0 }\n[[layer]]\nname = \"St\"\n"
+        "[layer.veil]\nform = \"stratus\"\nwavelength_m = 1000\noctaves = 1\nsheet = 0.5\n");
+    struct Writer : SimulationSink {
+        explicit Writer(const Scene& scene, const fs::path& folder) : files(scene, {folder, "veil"}) {}
+        void step(const StepResult&) override {}
+        void frame(const FrameResult& frame) override {
+            if (written.empty()) written = files.write_density(frame);
+        }
+        FrameWriter files;
+        std::vector<WrittenFile> written;
+    } writer(scene, folder_);
+    for (Simulation s(scene, full_range(scene), std::string(32, '0')); !s.finished() && writer.written.empty();)
+        s.advance(writer);
+    ASSERT_EQ(writer.written.size(), 3u);
+    const Vec3 place{1400, 800, 400};  // where the vortex is fastest
+    const auto velocity = [&](std::size_t file, int part) {
+        return sample_at(read_samples(writer.written[file].path, "vel", 3), place, part);
+    };
+    EXPECT_NEAR(velocity(2, 1), 3, 1e-6);
+    EXPECT_GT(std::abs(velocity(1, 1) - 3), 1);
+    EXPECT_GT(std::abs(velocity(0, 1) - 3), 1) << "the file of all layers";
 }
 
 TEST_F(SceneFiles, BadFilesAreNamed) {
