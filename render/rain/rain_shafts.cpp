@@ -67,12 +67,13 @@ float within_noise(double cells) {
     return float(cells - kShaftNoiseSide * std::floor(cells / kShaftNoiseSide));
 }
 
-// Sets how the curtain shades itself from the sun.
+// Sets how the curtain shades itself from the sun. Half of what drops as large as these take from a beam is diffracted by less than
+// the sun's radius (van de Hulst 1957, 8.1) and arrives all the same.
 void set_sun(const RainCurtain& c, const Vec3& to_sun, SeenCurtain& out) {
     const double x = to_sun.x - c.lean_x * to_sun.z, y = to_sun.y - c.lean_y * to_sun.z;
     out.sun_x = float((c.axis_x * x + c.axis_y * y) / c.semi_a_m);
     out.sun_y = float((c.axis_x * y - c.axis_y * x) / c.semi_b_m);
-    out.sun_per_m = out.per_m * float(mean_water(c));
+    out.sun_per_m = 0.5f * out.per_m * float(mean_water(c));
 }
 
 SeenCurtain seen_curtain(const RainCurtain& c, const PrecipitationOptions& p, const Vec3& eye,

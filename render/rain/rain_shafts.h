@@ -21,8 +21,8 @@
 //     s = 0.6 N(x + o, y) + 0.4 N(4 x, 4 y + o),    o = id mod kShaftsOwn
 //     f = N(x + y, (height + kShaftFall time) / kShaftFallCell + o)
 //
-// A curtain shades itself: at a place in it the sun has exp(-depth) of its light, with the optical depth of the ray to the sun
-// in the same curtain. There the rain is the mean of its texture and of its cloud's water, at all heights the same, and
+// A curtain shades itself: at a place in it the sun has exp(-depth) of its light, with half of the optical depth of the ray to
+// the sun in the same curtain; what drops diffract arrives. There the rain is the mean of its texture and of its cloud's water, at all heights the same, and
 // across the axis a polynomial that has the mean of smooth((1 - r) / softness) over the ellipse (sun_profile()),
 //
 //     1 - w + w (1 - r^2)^2,    w = softness (1.5 - 0.45 softness), at most 1.

@@ -103,7 +103,7 @@ TEST(RainShafts, HaveTheirOpticalDepth) {
     EXPECT_NEAR(left_of_rain(1, 0.3), 1, 1e-12);
 }
 
-// The profile through which the sun shines has the optical depth of the rain itself, without texture: on the mean of places all
+// The profile through which the sun shines has half of the optical depth of the rain itself, without texture: on the mean of places all
 // over a leaning curtain, for each softness and height of the sun. The rain fades in at its top, which the profile leaves out.
 TEST(RainShafts, ShadeThemselvesAsMuchAsTheirRain) {
     RainCurtain curtain = area();
@@ -127,7 +127,7 @@ TEST(RainShafts, ShadeThemselvesAsMuchAsTheirRain) {
                     constexpr int kSteps = 2000;
                     const double step_m = (curtain.base_m - height_m) / light.to_sun.z / kSteps;
                     for (int n = 0; n < kSteps; ++n)
-                        rain += step_m * reference::extinction(twin, curtain, twin.whole_per_m[0],
+                        rain += 0.5 * step_m * reference::extinction(twin, curtain, twin.whole_per_m[0],
                                                                place + (n + 0.5) * step_m * light.to_sun);
                 }
             }

@@ -119,7 +119,7 @@ inline std::vector<Stretch> stretches(const Shafts& s, const Vec3& ray) {
     return joined;
 }
 
-// Optical depth of the ray to the sun in the curtain that it begins in, in steps.
+// Optical depth of the ray to the sun in the curtain that it begins in, in steps, without what drops diffract.
 inline double depth_to_sun(const Shafts& s, const RainCurtain& c, double whole_per_m, const Vec3& place) {
     constexpr int kSteps = 200;
     if (!(c.base_m > c.ground_m) || !(c.rate_mm_per_h > 0)) return 0;
@@ -134,7 +134,7 @@ inline double depth_to_sun(const Shafts& s, const RainCurtain& c, double whole_p
         const double r2 = ellipse_value(ellipse_at(c, at.z), at.x, at.y);
         if (r2 < 1) depth += (1 - profile + profile * (1 - r2) * (1 - r2)) * far_m / kSteps;
     }
-    return whole_per_m * mean_water(c) * depth;
+    return 0.5 * whole_per_m * mean_water(c) * depth;
 }
 
 // The light with what the curtains around a place leave of the sun.
