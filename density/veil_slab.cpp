@@ -38,7 +38,7 @@ float nearest(float offset_m, double period_m) {
     return period_m > 0 ? float(std::remainder(double(offset_m), period_m)) : offset_m;
 }
 
-// How an octave follows from the one before: by the powers of the options, or as the last octave of a list follows from
+// Says how an octave follows from the one before: by the powers of the options, or as the last octave of a list follows from
 // the last but one if it is finer, in no direction coarser, and weighs less.
 struct Progression {
     Vec3 wavelength{1, 1, 1};

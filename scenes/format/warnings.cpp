@@ -176,7 +176,7 @@ void add_direct_keys(const FieldOptions& shared, const LayerOptions& layer, std:
         add("its ellipsoids, scatters, profile and coupling have");
 }
 
-// Whether the profile of the wind, which brings clouds into the world, blows at any time.
+// Returns whether the profile of the wind, which brings clouds into the world, blows at any time.
 bool blows(const Wind& wind) {
     return std::ranges::any_of(wind.keyframes, [](const WindKeyframe& keyframe) {
         return std::ranges::any_of(keyframe.levels, [](const WindLevel& level) {
@@ -209,7 +209,7 @@ void add_background(const Scene& scene, std::vector<std::string>& to) {
                                      layer.name));
 }
 
-// How the number of clouds follows the state, where it cannot follow over the horizon.
+// Notes how the number of clouds follows the state, where it cannot follow over the horizon.
 void add_entering(const Scene& scene, std::size_t n, std::vector<std::string>& to) {
     const LayerOptions& layer = scene.layers[n];
     if (layer.entering != Entering::horizon) return;
@@ -241,7 +241,7 @@ void add_sections_of_automata(const Scene& scene, std::vector<std::string>& to) 
         to.emplace_back("[density] has no effect: all layers are drawn directly");
 }
 
-// Whether a layer's bases are at the heights of a genus in the region, as far as they lie in its lattice.
+// Returns whether a layer's bases are at the heights of a genus in the region, as far as they lie in its lattice.
 bool has_heights_of_genus(const Scene& scene, const LayerOptions& layer) {
     const double ground_m = scene.render.ground.height_m, bottom_m = layer.placement.origin_m.z,
                  top_m = bottom_m + layer.extent.z * layer.placement.cell_size_m;

@@ -67,6 +67,8 @@ PICTURES = {
     "torchelsen-dark-and-bright.jpg": (1, (640, 400), [("torchelsen/dark-and-bright", 1, {})]),
     "torchelsen-alike.jpg": (1, (640, 400), [("torchelsen/dark-and-bright", 1, {"layer[0].light_absorption": "0"})]),
     "sapronov-shade.jpg": (1, (640, 400), [("sapronov/shade", 1, {})]),
+    "sapronov-rain.jpg": (1, (640, 400), [("sapronov/rain", 24, {})]),
+    "sapronov-fog-over-water.jpg": (1, (640, 400), [("sapronov/fog-over-water", 24, {})]),
     "debug-view.png": (1, (640, 480), [("torchelsen/cloud-1", 1, {f"debug_view.{part}": "true" for part in ("boxes", "axes", "roots", "rays")} | {"camera.vertical_fov_deg": "22"})]),
 }
 GAP = 3  # pixels between parts
