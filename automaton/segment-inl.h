@@ -93,7 +93,7 @@ struct BirthScratch {
     std::uint64_t counters[kMaxCounters + kMaxLanes64];  // packed, see philox-inl.h
     // The two words of each event; 16 more, as the last vector of events reads beyond.
     std::uint32_t first[2 * (kMaxCounters + kMaxLanes64) + 16], second[2 * (kMaxCounters + kMaxLanes64) + 16];
-    // Of extinctions, see choose_cells().
+    // Cells of extinctions and what is left of their first words, see choose_cells().
     std::uint32_t cells[2 * (kMaxCounters + kMaxLanes64) + 16], left[2 * (kMaxCounters + kMaxLanes64) + 16];
     std::uint32_t accepted[2 * (kMaxCounters + kMaxLanes64) + 16];  // see pack_event()
     int accepted_count = 0;

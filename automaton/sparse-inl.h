@@ -333,7 +333,7 @@ inline void queue_sparse(const Segment& g, int block, unsigned draws, BirthScrat
     job.births = births;
     job.extinctions = extinctions;
     job.uniform = uniform;
-    // What is left of an earlier job belongs to draws that this one does not make.
+    // Rates of draws that this job does not make stay those of an earlier one; nothing reads them.
     if (known != nullptr) {
         job.rates = known->rates;
     } else {

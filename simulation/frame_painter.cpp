@@ -66,7 +66,7 @@ void fall_from(const std::shared_ptr<const CloudBases>& cloud, RainCurtain& curt
     curtain.cloud = cloud;
 }
 
-// The cloud of billboards above the rain areas of a layer.
+// Returns the cloud of billboards above the rain areas of a layer.
 std::shared_ptr<const CloudBases> cloud_of_billboards(const LayerFrame& layer, double time_s) {
     const double most = std::numeric_limits<double>::max();
     Vec2 low_m{most, most}, high_m{-most, -most};

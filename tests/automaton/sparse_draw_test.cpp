@@ -104,7 +104,7 @@ TEST(Births, KeepARareDrawBesideAFrequentOne) {
     const int steps = int(std::lround(kExpected / (kRare * cells)));
     std::size_t births = 0;
     for (int step = 0; step < steps; ++step) {
-        // From an empty lattice each time, so that no birth makes others.
+        // Starts from an empty lattice each time, so that no birth makes others.
         Automaton automaton(o, Lattice{BitPlane(o.extent), BitPlane(o.extent), BitPlane(o.extent)});
         automaton.step();
         const BitPlaneView act = automaton.act();

@@ -129,7 +129,7 @@ TEST(CloudBases, OfPiecesAreTheirUndersides) {
     EXPECT_EQ(bases.at(0, 450).water, 0);
 }
 
-// What covers other pieces adds its opacity; the lower one is the base, unless it is hardly there.
+// Pieces that cover others add their opacity; the lower one is the base, unless it is hardly there.
 TEST(CloudBases, OfPiecesAreThoseOfTheLowest) {
     const CloudPiece high{{0, 0, 1500}, 800, 400, 0.5}, low{{0, 0, 900}, 800, 200, 0.5}, shred{{0, 0, 300}, 800, 100, 0.05};
     const auto column = [](const std::vector<CloudPiece>& pieces) {

@@ -252,7 +252,7 @@ TEST(TerrainPicture, SunAndCloudsShadeIt) {
     EXPECT_LT(shaded, 0.9 * lit);
 }
 
-// From above: the top of the wall is white above the snow line, but for its steep rims; its sides and the low ground keep their
+// Seen from above, the top of the wall is white above the snow line, but for its steep rims; its sides and the low ground keep their
 // colour, but where smooth edges mix them with what is beside them.
 TEST(TerrainPicture, SnowLiesOnHighAndGentleGround) {
     RenderOptions bare = view();
@@ -310,7 +310,7 @@ TEST(TerrainPicture, SnowLiesInShelter) {
     bare.air.extinction_per_m = {0, 0, 0};
     RenderOptions snowy = bare;
     snowy.terrain.snow_line_m = 420;
-    // How much brighter each pixel is with snow, where the ground around stands at a height.
+    // Compares how bright each pixel is with and without snow, where the ground around stands at a height.
     const auto brightened = [&](float around_m) {
         HeightImage image{41, 41, std::vector<float>(41 * 41, around_m)};
         for (int j = 16; j <= 24; ++j)

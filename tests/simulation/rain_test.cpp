@@ -142,7 +142,7 @@ SkyOptions billboards() {
     return options;
 }
 
-// Of clouds that are drawn directly: below each billboard from its underside, and none beside it.
+// Rain of clouds that are drawn directly begins at the underside of each billboard, and there is none beside it.
 TEST(RainOfAFrame, BeginsAtTheBillboardsOfALayerWithoutVoxels) {
     const Scene scene = read_scene_text(kScene, "rain.toml");
     const SkySimulation sky(billboards());
