@@ -91,8 +91,8 @@ inline void begin_march(const MarchedScene& march, const TileRays& rays, MarchSt
     state.begun = true;
 }
 
-// The numbers of a ray on its way.
-enum RayPart : std::size_t { kDistance, kLeft, kExtinction, kWay, kMargin, kStop, kRayX, kRayY, kRayZ, kRayParts };
+// The numbers of a ray on its way; kEnd: the transmittance at which it ends.
+enum RayPart : std::size_t { kDistance, kLeft, kExtinction, kWay, kMargin, kStop, kEnd, kRayX, kRayY, kRayZ, kRayParts };
 
 // The rays of a tile that go on, one after the other, so that no lane of a vector has none.
 struct WaitingRays {
@@ -105,10 +105,11 @@ struct WaitingRays {
     WaitingRays(const TileRays& rays, float limit_m, const MarchState& state, const TileSums& sums) {
         const Lanes d;
         const hn::RebindToSigned<Lanes> di;
-        const Floats limit = set(limit_m), opaque = set(shader::kMarchOpaque);
+        const Floats limit = set(limit_m);
         for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(d)) {
             const Floats distance = hn::Load(d, state.distance + at), left = hn::Load(d, sums.transmittance + at),
-                         stop = hn::Min(hn::Load(d, state.end + at), limit);
+                         stop = hn::Min(hn::Load(d, state.end + at), limit),
+                         opaque = hn::Mul(set(shader::kMarchOpaque), hn::Load(d, sums.opaque + at));
             const Mask go_on = hn::And(hn::Lt(distance, stop), hn::Gt(left, opaque));
             if (hn::AllFalse(d, go_on)) continue;
             // Full vectors are stored, each over the idle end of the one before.
@@ -121,6 +122,7 @@ struct WaitingRays {
             put(kWay, hn::Load(d, state.step + at));
             put(kMargin, hn::Load(d, state.margin + at));
             put(kStop, stop);
+            put(kEnd, opaque);
             put(kRayX, hn::Load(d, rays.x + at));
             put(kRayY, hn::Load(d, rays.y + at));
             put(kRayZ, hn::Load(d, rays.z + at));
@@ -209,7 +211,7 @@ struct MarchQueues {
 // Takes the next sample of each ray into account, and goes on behind it.
 HWY_INLINE void advance(const MarchedScene& march, MarchLanes& lanes, MarchQueues& queues) {
     const Lanes d;
-    const Floats zero = hn::Zero(d), one = set(1.0f), opaque = set(shader::kMarchOpaque);
+    const Floats zero = hn::Zero(d), one = set(1.0f);
     const Mask active = lanes.active;
     const Floats distance = lanes.parts[kDistance], extinction = lanes.parts[kExtinction], way = lanes.parts[kWay],
                  margin = lanes.parts[kMargin];
@@ -230,7 +232,7 @@ HWY_INLINE void advance(const MarchedScene& march, MarchLanes& lanes, MarchQueue
     const Floats opacity = hn::IfThenElseZero(active, hn::Sub(one, fast_exp(hn::Neg(depth))));
     Floats seen = hn::Mul(left, opacity);
     left = hn::Sub(left, seen);
-    const Mask ends = hn::And(active, hn::Le(left, opaque));  // what little is left is seen here, too
+    const Mask ends = hn::And(active, hn::Le(left, lanes.parts[kEnd]));  // what little is left is seen here, too
     seen = hn::IfThenElse(ends, hn::Add(seen, left), seen);
     left = hn::IfThenElse(ends, zero, left);
     lanes.weight = hn::Add(lanes.weight, seen);
@@ -262,14 +264,14 @@ inline void march_to(const ViewScene& scene, const TileRays& rays, float limit_m
         while (!hn::AllFalse(d, lanes.active)) {
             advance(*scene.march, lanes, queues);
             lanes.active = hn::And(lanes.active, hn::And(hn::Lt(lanes.parts[kDistance], lanes.parts[kStop]),
-                                                         hn::Gt(lanes.parts[kLeft], set(shader::kMarchOpaque))));
+                                                         hn::Gt(lanes.parts[kLeft], lanes.parts[kEnd])));
         }
         const Mask rest = hn::Gt(lanes.weight, hn::Zero(d));
         if (!hn::AllFalse(d, rest)) queues.add(rest, lanes);
         lanes.store(count, state, sums);
     }
     queues.shade_all();
-    state.find_next(sums.transmittance);
+    state.find_next(sums.transmittance, sums.opaque);
 }
 
 }  // namespace nephos::HWY_NAMESPACE

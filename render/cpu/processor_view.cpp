@@ -150,6 +150,23 @@ const BillboardTexels* ProcessorView::texels() const {
     return source_.empty() ? nullptr : &billboard_texels(order_->pictures);
 }
 
+TileSums::TileSums(const PictureFrame& frame, int left, int top) : TileSums() {
+    if (!(frame.sun_disc.w > 0)) return;
+    const auto of = [](const shader::vec4& axis) { return Vec3(double(axis.x), double(axis.y), double(axis.z)); };
+    const Vec3 right = of(frame.right), up = of(frame.up), forward = of(frame.forward), to_sun = of(frame.to_sun);
+    const auto apart = [&](double column, double row) {
+        const double x = 2 * (column + left + double(frame.picture.z)) / double(frame.picture.x) - 1,
+                     y = 1 - 2 * (row + top + double(frame.picture.w)) / double(frame.picture.y);
+        return float(glm::distance(glm::normalize(forward + x * right + y * up), to_sun));
+    };
+    constexpr float kHalfTile = 10;  // pixels, at least half of its diagonal
+    const float of_middle = apart(0.5 * shader::kTileWidth, 0.5 * shader::kTileHeight);
+    if (opaque_beside_sun(of_middle - kHalfTile / frame.up.w, frame.up.w) == shader::kOpaque) return;
+    for (std::size_t n = 0; n < kPixels; ++n)
+        opaque[n] = opaque_beside_sun(
+            apart(double(n % shader::kTileWidth) + 0.5, double(n / shader::kTileWidth) + 0.5), frame.up.w);
+}
+
 void ProcessorView::light(Batch& batch, const VisibleSet* seen) const {
     const StageTimer timer(times_, DrawStage::colour);
     const std::size_t count = batch.end - batch.begin, parts = (count + kPart - 1) / kPart;
@@ -192,7 +209,7 @@ bool ProcessorView::find_visible_in_tiles(std::size_t first, std::size_t step,
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
         const std::size_t t = first + i * step;
         const ViewTile tile = tile_at(t, grid, batch.bins);
-        TileSums sums;
+        TileSums sums(frame_, tile.x, tile.y);
         const TileWork work = HWY_DYNAMIC_DISPATCH(find_visible_balls)(scene, tile, sums);
         pairs += work.pairs;
         drawn[t] = std::uint32_t(work.splats);
@@ -274,6 +291,7 @@ void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size,
             const ViewTile tile = tile_at(t, grid, batch.bins);
             TileSums own;
             TileSums& sums = sums_between.empty() ? own : sums_between[t];
+            if (begin == 0) sums = TileSums(frame_, tile.x, tile.y);
             MarchState own_march;
             MarchState* const state = march == nullptr         ? nullptr
                                       : march_between.empty() ? &own_march

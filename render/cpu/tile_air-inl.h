@@ -107,7 +107,7 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
     const PictureFrame& frame = *scene.frame;
     const shader::Shells& data = frame.shells->data;
     Floats transmittance = hn::Load(d, sums.transmittance + at);
-    if (hn::AllTrue(d, hn::Lt(transmittance, set(shader::kOpaque)))) return;
+    if (hn::AllTrue(d, hn::Lt(transmittance, hn::Load(d, sums.opaque + at)))) return;
     const Floats3 ray{hn::Load(d, rays.x + at), hn::Load(d, rays.y + at), hn::Load(d, rays.z + at)};
     const AirInterval part = interval_with_air(*frame.shells, frame.endless, ray);
     if (part.begin >= part.end) return;

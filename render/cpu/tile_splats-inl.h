@@ -123,10 +123,10 @@ void add_exact(const ScreenBall& screen, const ExactBall& ball, const ViewTile& 
 
 inline bool is_opaque(const TileSums& sums, std::size_t lanes) {
     const Lanes d;
-    Floats most = hn::Zero(d);
+    Floats most = set(-1.0f);
     for (std::size_t at = 0; at < kTilePixels; at += lanes)
-        most = hn::Max(most, hn::Load(d, sums.transmittance + at));
-    return hn::AllTrue(d, hn::Lt(most, set(shader::kOpaque)));
+        most = hn::Max(most, hn::Sub(hn::Load(d, sums.transmittance + at), hn::Load(d, sums.opaque + at)));
+    return hn::AllTrue(d, hn::Lt(most, hn::Zero(d)));
 }
 
 HWY_INLINE float distance_of(const ScreenBall& ball, const ViewScene& scene) {
@@ -248,7 +248,7 @@ inline void finish_tile(const ViewScene& scene, const ViewTile& tile, TileSums& 
         for (std::size_t row = 0; row < shader::kTileHeight; row += layout.rows) {
             const std::size_t at = row * shader::kTileWidth + block * layout.lanes;
             const Floats left = hn::Min(hn::Load(d, sums.transmittance + at), set(1.0f));
-            const Floats seen = hn::IfThenElseZero(hn::Ge(left, set(shader::kOpaque)), left);
+            const Floats seen = hn::IfThenElseZero(hn::Ge(left, hn::Load(d, sums.opaque + at)), left);
             hn::Store(seen, d, sums.transmittance + at);
             const Floats opacity = hn::Sub(set(1.0f), seen);
             const auto has_depth = hn::Ge(opacity, set(kLeastOpacity));

@@ -22,8 +22,14 @@ struct TileSums {
     static constexpr std::size_t kPixels = shader::kTileWidth * shader::kTileHeight;
     alignas(64) float red[kPixels] = {}, green[kPixels] = {}, blue[kPixels] = {}, distance[kPixels] = {};
     alignas(64) float transmittance[kPixels];
-    std::size_t next_shell = 0;  // of air: those before it are in the sums
-    TileSums() { std::fill_n(transmittance, kPixels, 1.0f); }
+    alignas(64) float opaque[kPixels];  // transmittance below which nothing behind is seen
+    std::size_t next_shell = 0;         // of air: those before it are in the sums
+    TileSums() {
+        std::fill_n(transmittance, kPixels, 1.0f);
+        std::fill_n(opaque, kPixels, shader::kOpaque);
+    }
+    // Of the tile whose first pixel this is, which may have the sun's disc in it.
+    TileSums(const PictureFrame& frame, int x, int y);
 };
 
 // The data shared by all tiles of a part of the picture.

@@ -40,7 +40,7 @@ inline void mark_ground(const ViewScene& scene, const ViewTile& tile, const Tile
         const Floats3 ray = times(hn::Div(set(1.0f), hn::Sqrt(dot(direction, direction))), direction);
         const Floats distance = ground_distance(frame, ray.z);
         const auto shown = hn::And(hn::Lt(distance, set(kNowhere)),
-                                   hn::Ge(hn::Load(d, sums.transmittance + at), set(shader::kOpaque)));
+                                   hn::Ge(hn::Load(d, sums.transmittance + at), hn::Load(d, sums.opaque + at)));
         if (hn::AllFalse(d, shown)) continue;
         const Floats3 point = times(hn::IfThenElseZero(shown, distance), ray);
         const auto texel = [&](const shader::vec4& axis) {

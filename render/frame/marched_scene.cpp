@@ -92,10 +92,10 @@ MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& c
     fade_ends = scale * shader::kSplattedFootprint_m / per_unit;
 }
 
-void MarchState::find_next(const float* transmittance) {
+void MarchState::find_next(const float* transmittance, const float* opaque) {
     next = std::numeric_limits<float>::max();
     for (std::size_t n = 0; n < kPixels; ++n)
-        if (distance[n] < end[n] && transmittance[n] > shader::kMarchOpaque) next = std::min(next, distance[n]);
+        if (distance[n] < end[n] && transmittance[n] > shader::kMarchOpaque * opaque[n]) next = std::min(next, distance[n]);
     done = next == std::numeric_limits<float>::max();
 }
 

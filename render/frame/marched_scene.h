@@ -65,8 +65,9 @@ struct MarchState {
     float next = 0;                              // the least distance of a next sample
     bool begun = false, done = false;
 
-    // Sets `next` and `done`, given the kPixels fractions of the light behind them that rays leave.
-    void find_next(const float* transmittance);
+    // Sets `next` and `done`, given the kPixels fractions of the light behind them that rays leave, and those at which
+    // nothing is seen.
+    void find_next(const float* transmittance, const float* opaque);
 };
 
 }  // namespace nephos

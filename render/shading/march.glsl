@@ -258,7 +258,7 @@ struct MarchEvent {
 };
 
 // Takes a sample into account and goes on to the next place.
-void advance(MarchSample now, inout MarchState state, inout MarchEvent event, inout float left) {
+void advance(MarchSample now, float opaque, inout MarchState state, inout MarchEvent event, inout float left) {
     float found = now.extinction;
     // The step before counts as cloud; where it came from outside, only from the surface on: where the margin of the
     // two samples passes zero, or about one fine step where empty space was skipped.
@@ -269,7 +269,7 @@ void advance(MarchSample now, inout MarchState state, inout MarchEvent event, in
     float way = state.extinction > 0.0 ? state.way : min(state.way, behind);
     float seen = left * (1.0 - exp(-0.5 * (found + state.extinction) * way));
     left -= seen;
-    bool ends = left <= kMarchOpaque;  // what little is left is seen here, too
+    bool ends = left <= opaque;  // what little is left is seen here, too
     if (ends) {
         seen += left;
         left = 0.0;
@@ -300,20 +300,21 @@ float march_end(vec3 ray) {
 // lavapipe goes through the body of a loop once, even if no invocation does.
 void march_to(float stop, vec3 ray, inout MarchState state, inout vec4 sum, inout float sum_distance) {
     vec3 per_ray = inverse_of(ray);
+    float opaque = kMarchOpaque * opaque_along(ray);
     MarchEvent event = MarchEvent(0.0, 0.0, 0u, false);
-    while (state.distance < stop && sum.a > kMarchOpaque) {
+    while (state.distance < stop && sum.a > opaque) {
         event.full = false;
-        while (!event.full && state.distance < stop && sum.a > kMarchOpaque) {
+        while (!event.full && state.distance < stop && sum.a > opaque) {
             MarchSample now;
             bool near = false;
-            while (!near && !event.full && state.distance < stop && sum.a > kMarchOpaque) {
+            while (!near && !event.full && state.distance < stop && sum.a > opaque) {
                 now = survey(ray, per_ray, state.distance);
                 near = now.near != 0u;
-                if (!near) advance(now, state, event, sum.a);
+                if (!near) advance(now, opaque, state, event, sum.a);
             }
             if (near) {
                 sample_near(now, ray, state.distance, sum.a);
-                advance(now, state, event, sum.a);
+                advance(now, opaque, state, event, sum.a);
             }
         }
         if (event.weight > 0.0) {

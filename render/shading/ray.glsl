@@ -10,6 +10,14 @@ vec3 pixel_direction(vec2 point) {
 
 vec3 pixel_ray(vec2 point) { return normalize(pixel_direction(point)); }
 
+// Returns the transmittance below which nothing is seen behind what is before it, as opaque_beside_sun() (frame_data.h).
+// Without a branch: lavapipe would recompile shaders whose loops depend on it for each frame.
+float opaque_along(vec3 ray) {
+    vec3 apart = ray - frame.to_sun.xyz;
+    float beyond = (sqrt(dot(apart, apart)) - kSunRadius) * frame.up.w;  // the sun's rim, pixels
+    return mix(kOpaque, kSunOpaque, clamp((1.0 - beyond) * 1.0e6, 0.0, 1.0) * frame.sun_disc.w);
+}
+
 layout(constant_id = 9) const bool kTerrain = false;  // ground that is not level (render/terrain/terrain_view.h)
 layout(set = 0, binding = 23, std430) readonly buffer Terrain {
     float terrain[];  // its distance in each pixel of the picture

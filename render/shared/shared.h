@@ -37,6 +37,7 @@ NEPHOS_CONST uint kTileWidth = 8u, kTileHeight = 16u;  // pixels
 NEPHOS_CONST uint kQueriesPerLane = 4u;
 NEPHOS_CONST float kDistanceUnit = 16.0f;     // metres
 NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance below which splats behind are skipped
+NEPHOS_CONST float kSunOpaque = 1.0f / 4294967296.0f;  // ... where the sun is behind: its disc outshines all else
 NEPHOS_CONST uint kIntegrate = 1u;  // flag: evaluate the integral along the ray, do not use the textures
 NEPHOS_CONST uint kNotFitted = 4u;  // flag: the tiles evaluate the integral, whatever the billboards do
 NEPHOS_CONST uint kBillboardFlag = 8u;  // flag, of no metaball: a billboard, whose index is in the bits from 4 on

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "render/frame/frame_data.h"
 #include "render/options/halo_phase.h"
 #include "render/options/phase_function.h"
 
@@ -21,7 +22,8 @@ constexpr double kPartDepth = 0.5;  // optical, of a part of a step, where the d
 constexpr int kMostParts = 6;       // of a step
 constexpr int kStepsAtOnce = 4;     // of a run
 constexpr std::size_t kRuns = 1024;
-constexpr double kOpaque = 1.0 / 512;  // transmittance; what remains is less than a step of a picture of 8 bits
+// Transmittance, times that below which nothing is seen: what remains is less than a step of a picture of 8 bits.
+constexpr double kOpaque = 8;
 
 // Fraction of the light that meets prisms of ice and leaves through two of their sides in this way.
 constexpr double kHaloPerPrism = 0.12;
@@ -86,6 +88,8 @@ void SampleGroup::flush() {
 void SampleGroup::prepare_light(Run& run, double column) const {
     const VeilView& view = sheet_.veil->view;
     run.cosine = run.ray.x * sheet_.to_sun.x + run.ray.y * sheet_.to_sun.y + run.ray.z * sheet_.to_sun.z;
+    const double apart = std::sqrt(std::max(0.0, 2 * (1 - run.cosine)));
+    run.opaque = kOpaque * double(opaque_beside_sun(float(apart), float(1 / sheet_.per_pixel)));
     if (view.light == VeilLighting::two_samples) {
         // v = -ray; h . v = sqrt((1 + l . v) / 2).
         const double half = std::sqrt(std::clamp(0.5 * (1 - run.cosine), 0.0, 1.0));
@@ -106,7 +110,7 @@ bool SampleGroup::look_ahead() {
     for (std::size_t r = 0; r < runs_.size(); ++r) {
         Run& run = runs_[r];
         if (run.ended()) continue;
-        if (seen_[run.pixel].transmittance <= kOpaque) {
+        if (seen_[run.pixel].transmittance <= run.opaque) {
             run.done = run.count;
             continue;
         }
@@ -179,7 +183,7 @@ void SampleGroup::cover() {
     sun_.clear();
     for (const Part& part : parts_) {
         SeenVeil& seen = seen_[runs_[part.run].pixel];
-        if (part.density <= 0 || seen.transmittance <= kOpaque) continue;
+        if (part.density <= 0 || seen.transmittance <= runs_[part.run].opaque) continue;
         const double density = sheet_.height_factor(part.z) * part.density,
                      optical = sheet_.veil->extinction_per_m * density * part.length_m;
         const double covers = seen.transmittance * (view.light == VeilLighting::two_samples

@@ -110,6 +110,7 @@ class SampleGroup {
         int count = 0, parts = 1;
         std::size_t first = 0;    // of densities_
         int known = 0, looked = 0, done = 0;  // steps that are asked for, whose density is known, that are composited
+        double opaque = 0;        // transmittance behind which nothing is seen
         bool follows = false;     // the run before is of the same pixel
         // Of its light.
         SheetLight often{0, 1, 0};

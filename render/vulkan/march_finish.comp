@@ -30,13 +30,14 @@ void main() {
     if (index >= step.width * step.height) return;
     vec2 pixel = vec2(index % step.width, index / step.width) + 0.5;
     vec4 clouds = radiance[index];
-    if (clouds.a < kOpaque) return;
     vec3 ray = pixel_ray(pixel);
+    float opaque = opaque_along(ray);
+    if (clouds.a < opaque) return;
     terrain_end = terrain_at(pixel);
     MarchState state = load_march(index);
     float sum_distance = step.distances != 0u ? depth[index] : 0.0;
     march_to(march_end(ray), ray, state, clouds, sum_distance);
-    if (clouds.a < kOpaque) clouds.a = 0.0;
+    if (clouds.a < opaque) clouds.a = 0.0;
     clouds.rgb += clouds.a * background(ray);
     radiance[index] = clouds;
     if (step.distances != 0u) depth[index] = sum_distance;

@@ -29,9 +29,10 @@ void main() {
     uint index = gl_GlobalInvocationID.y * (kGroupRow * kComputeGroup) + gl_GlobalInvocationID.x;
     if (index >= step.width * step.height) return;
     vec4 sum = radiance[index];
-    if (sum.a < kOpaque) return;
     uvec2 pixel = uvec2(index % step.width, index / step.width);
     vec3 ray = pixel_ray(vec2(pixel) + 0.5);
+    float opaque = opaque_along(ray);
+    if (sum.a < opaque) return;
     terrain_end = terrain_at(vec2(pixel));
     SunlitAir sunlit = sunlit_air(ray);
     pixel += uvec2(frame.picture.zw);
@@ -45,7 +46,7 @@ void main() {
     uint k = drawn.x;
     while (k < drawn.y) {
         // Air alone, up to the shell with the next sample.
-        bool marches = state.distance < end && sum.a > kMarchOpaque;
+        bool marches = state.distance < end && sum.a > kMarchOpaque * opaque;
         uint next = marches ? max(k, min(shells_before(state.distance), drawn.y)) : drawn.y;
         for (uint n = max(k, first); n < min(next, last); ++n) {
             AirLayer air = air_shell(n, sunlit, ray, pixel);

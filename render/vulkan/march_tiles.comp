@@ -47,11 +47,11 @@ void main() {
     if (step.first_batch == 0u) state = load_march(at);
     float end = march_end(ray);
     uint i = range.begin;
-    while (i < range.end && transmittance[0] >= kOpaque) {
+    while (i < range.end && transmittance[0] >= opaque[0]) {
         // Splats alone, up to that behind the next sample.
         float limit_m = min(end, distance_of(list[i]));
-        while (i < range.end && transmittance[0] >= kOpaque &&
-               (state.distance >= limit_m || transmittance[0] <= kMarchOpaque)) {
+        while (i < range.end && transmittance[0] >= opaque[0] &&
+               (state.distance >= limit_m || transmittance[0] <= kMarchOpaque * opaque[0])) {
             uint index = list[i++];
             if (kBillboards && unpackHalf2x16(tails[index]).y < 0.0) {
                 add_billboard(splats[index].x, pixel);
@@ -60,7 +60,7 @@ void main() {
             }
             if (i < range.end) limit_m = min(end, distance_of(list[i]));
         }
-        if (i < range.end && transmittance[0] > kMarchOpaque) {
+        if (i < range.end && transmittance[0] > kMarchOpaque * opaque[0]) {
             vec4 sum = vec4(red[0], green[0], blue[0], transmittance[0]);
             march_to(limit_m, ray, state, sum, mean_distance[0]);
             red[0] = sum.r;

@@ -22,6 +22,7 @@ layout(constant_id = 4) const bool kDistances = true;
 
 float red[kRows], green[kRows], blue[kRows], mean_distance[kRows], transmittance[kRows];
 float per_square[kRows];  // 1 / |direction|^2 of each pixel
+float opaque[kRows];      // opaque_along() it
 float ends[kRows];        // terrain_at() each pixel
 
 void add(uint row, float opacity, vec3 colour, float distance) {
@@ -136,6 +137,7 @@ void load_sums(uvec2 first) {
         mean_distance[row] = sum_distance;
         vec3 direction = pixel_direction(pixel + vec2(0.0, float(row)));
         per_square[row] = 1.0 / dot(direction, direction);
+        opaque[row] = opaque_along(direction * sqrt(per_square[row]));
         if (kTerrain) ends[row] = terrain_at(pixel + vec2(0.0, float(row)));
     }
 }
@@ -145,7 +147,7 @@ void store_sums(uvec2 first) {
         uint y = first.y + row;
         if (first.x < step.width && y < step.height) {
             vec4 sum = vec4(red[row], green[row], blue[row], min(transmittance[row], 1.0));
-            if (sum.a < kOpaque) sum.a = 0.0;
+            if (sum.a < opaque[row]) sum.a = 0.0;
             radiance[y * step.width + first.x] = sum;
             if (kDistances) depth[y * step.width + first.x] = mean_distance[row];
         }

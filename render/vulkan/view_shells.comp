@@ -25,9 +25,9 @@ void main() {
     uint index = gl_GlobalInvocationID.y * (kGroupRow * kComputeGroup) + gl_GlobalInvocationID.x;
     if (index >= step.width * step.height) return;
     vec4 sum = radiance[index];
-    if (sum.a < kOpaque) return;
     uvec2 pixel = uvec2(index % step.width, index / step.width);
     vec3 ray = pixel_ray(vec2(pixel) + 0.5);
+    if (sum.a < opaque_along(ray)) return;
     terrain_end = terrain_at(vec2(pixel));
     SunlitAir sunlit = sunlit_air(ray);
     pixel += uvec2(frame.picture.zw);

@@ -23,9 +23,9 @@ layout(constant_id = 3) const bool kMixed = false;
 layout(constant_id = 8) const bool kBillboards = false;  // some splats are T's billboards
 
 bool is_opaque() {
-    float most = 0.0;
-    [[unroll]] for (uint row = 0u; row < kRows; ++row) most = max(most, transmittance[row]);
-    return kShared ? subgroupAll(most < kOpaque) : most < kOpaque;
+    float most = -1.0;
+    [[unroll]] for (uint row = 0u; row < kRows; ++row) most = max(most, transmittance[row] - opaque[row]);
+    return kShared ? subgroupAll(most < 0.0) : most < 0.0;
 }
 
 // Eight splats that are all fitted, one of each lane in turn.

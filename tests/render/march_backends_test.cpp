@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -165,6 +166,38 @@ TEST_F(MarchBackends, AgreeThroughAir) {
         options.fog.extinction_per_m = 2e-4;
         options.fog.height_m = 900;
         expect_same(cloud.splats(), options, each.name);
+    }
+}
+
+// What dims the sun ten thousand times leaves its disc brighter than all around it: it must not be taken for opaque.
+TEST_F(MarchBackends, TheSunShinesThroughThickCloud) {
+    RenderOptions options = test::view({0, -2000, 500}, {480, 400, 1210}, 3, 96, 72);
+    const Vec3 way = options.camera.target_m - options.camera.position_m;
+    options.sun.azimuth_deg = std::atan2(way.x, way.y) * 180 / std::numbers::pi;
+    options.sun.elevation_deg = std::atan2(way.z, std::hypot(way.x, way.y)) * 180 / std::numbers::pi;
+    options.atmosphere.model = AirModel::physical;
+    options.camera.glare = 0.1;  // the disc as bright as it is
+    DetailedCloud detailed, plain;
+    detailed.extinction_per_m = 0.05;
+    plain.extinction_per_m = 0.065;
+    for (DetailedCloud* cloud : {&detailed, &plain}) cloud->add({0, 0, 1000}, 1);
+    Splats metaballs = plain.splats();
+    metaballs.metaballs.detailed = {};
+    for (Renderer* renderer : {&cpu_, &vulkan_}) {
+        const Picture clear = renderer->draw_splats({}, options);
+        for (const bool marched : {true, false}) {
+            const Picture picture = renderer->draw_splats(marched ? detailed.splats() : metaballs, options);
+            // Elsewhere rays and splats end here.
+            const float opaque = marched ? 1.0f / 64.0f : 1.0f / 4096.0f;
+            std::size_t dimmed = 0;
+            for (std::size_t i = 0; i < picture.pixels(); ++i) {
+                const float disc = clear.beauty[3 * i], left = picture.transmittance[i];
+                if (disc < 1e4f) continue;
+                EXPECT_NEAR(picture.beauty[3 * i], left * disc, 6) << "transmittance " << left;
+                dimmed += left > 1e-7f && left < opaque ? 1 : 0;
+            }
+            EXPECT_GT(dimmed, 20u);
+        }
     }
 }
 
