@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of models, skies and layers together: references by name, keys that default to those of the scene,
-// and options that SkySimulation would refuse.
+// Checks of layers together with the scene: keys that default to those of the scene, and options that SkySimulation would
+// refuse.
 
 #include <algorithm>
 #include <cmath>
@@ -17,175 +17,9 @@
 namespace nephos {
 namespace {
 
-SectionReader item_of(const SectionReader& scene, const char* array, std::size_t index) {
-    return {scene.document, scene.find(array)->value.items[index], indexed(array, index), {}};
-}
-
-// Returns the reader of a table within a table; of an empty one at the position of its parent when it is
-// missing.
-SectionReader below(const SectionReader& reader, std::string_view name) {
-    static const Node empty;
-    const Entry* entry = reader.find(name);
-    const std::string path = reader.path + "." + std::string(name);
-    if (entry == nullptr || entry->value.kind != Node::Kind::table) return {reader.document, empty, path, {}};
-    return {reader.document, entry->value, path, {}};
-}
-
-// Returns the reader of an item of an array of tables within a table.
-SectionReader rule_of(const SectionReader& reader, const char* array, std::size_t index) {
-    return {reader.document,
-            reader.find(array)->value.items[index],
-            indexed(reader.path + "." + array, index),
-            {}};
-}
-
-// The item of an array of texts, or the text alone.
-const Node& text_item(const SectionReader& reader, std::string_view key, std::size_t index) {
-    const Node& node = reader.find(key)->value;
-    return node.kind == Node::Kind::array ? node.items[index] : node;
-}
-
-template <typename Item>
-void check_names_differ(const SectionReader& reader, const char* array, const std::vector<Item>& items,
-                        const char* what) {
-    for (std::size_t n = 0; n < items.size(); ++n) {
-        const SectionReader item = item_of(reader, array, n);
-        if (items[n].name.empty()) {
-            item.report("name", item.quoted("name") + " is empty",
-                        std::string("expected the name of a ") + what);
-            continue;
-        }
-        for (std::size_t m = 0; m < n; ++m) {
-            if (items[m].name != items[n].name) continue;
-            item.report("name", "there are two of the name " + enclosed(shortened(items[n].name), '"'),
-                        std::string("expected another name for each ") + what);
-            break;
-        }
-    }
-}
-
-// Reports a name that none of the items has, with the closest name.
-template <typename Item>
-void check_known(const SectionReader& reader, const Node& node, const std::string& name,
-                 const std::string& key, const std::vector<Item>& items, const char* what) {
-    if (std::ranges::find(items, name, &Item::name) != items.end()) return;
-    std::vector<std::string_view> names;
-    std::vector<std::string> quoted;
-    for (const Item& item : items) {
-        names.push_back(item.name);
-        if (quoted.size() < 20) quoted.push_back(enclosed(shortened(item.name), '"'));
-    }
-    const std::string_view meant = closest_word(name, names);
-    std::string expected = quoted.empty()
-                               ? std::string("expected the name of a ") + what + ", but there is none"
-                               : "expected " + joined(quoted);
-    if (!meant.empty()) expected = "did you mean " + enclosed(meant, '"') + "?";
-    reader.document.report(
-        node.place, reader.quoted(key) + ": there is no " + what + " " + enclosed(shortened(name), '"'),
-        std::move(expected));
-}
-
-// Reports those of the texts of a key that no item is called by. Only what was read whole is looked at.
-template <typename Item>
-void check_all_known(const SectionReader& reader, const char* key, const std::vector<std::string>& names,
-                     const std::vector<Item>& items, const char* what) {
-    const Entry* entry = reader.find(key);
-    if (entry == nullptr) return;
-    const Node& node = entry->value;
-    if (names.size() != (node.kind == Node::Kind::array ? node.items.size() : 1)) return;
-    for (std::size_t n = 0; n < names.size(); ++n)
-        check_known(reader, text_item(reader, key, n), names[n], key, items, what);
-}
-
-// Names of base models and skies that are not in the scene: also beside other problems, as long as all models, or
-// skies, have names that could be read.
-void check_references(const SectionReader& reader, const Scene& scene) {
-    const auto all_named = [&](const char* array, const auto& items) {
-        const Entry* entry = reader.find(array);
-        return (entry == nullptr || entry->value.items.size() == items.size()) &&
-               std::ranges::all_of(items, [](const auto& item) { return !item.name.empty(); });
-    };
-    const bool skies_known = all_named("sky", scene.skies);
-    const bool models_known = !reader.document.models_missing && all_named("model", scene.models);
-    for (std::size_t s = 0; models_known && s < scene.skies.size(); ++s)
-        check_all_known(item_of(reader, "sky", s), "models", scene.skies[s].models, scene.models,
-                        "base model");
-    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
-        const LayerOptions& layer = scene.layers[n];
-        const SectionReader item = item_of(reader, "layer", n);
-        if (layer.is_veil) continue;
-        if (skies_known) check_all_known(item, "skies", layer.skies, scene.skies, "sky");
-        for (std::size_t m = 0; models_known && m < layer.metamorphoses.size(); ++m) {
-            const SectionReader change = rule_of(item, "metamorphoses", m);
-            for (const char* key : {"from", "to"}) {
-                const NamedMetamorphosis& names = layer.metamorphoses[m];
-                const std::string& name = key == std::string_view("from") ? names.from : names.to;
-                if (!name.empty())
-                    check_known(change, change.find(key)->value, name, key, scene.models, "base model");
-            }
-        }
-        const SectionReader rain = below(item, "rain");
-        for (std::size_t r = 0; models_known && r < layer.rain.attached.size(); ++r) {
-            const std::string& model = layer.rain.attached[r].model;
-            if (model.empty()) continue;
-            const SectionReader rule = rule_of(rain, "attached", r);
-            check_known(rule, rule.find("model")->value, model, "model", scene.models, "base model");
-        }
-    }
-}
-
-void check_sky(const SectionReader& reader, const NamedSky& sky) {
-    if (sky.clouds > 0 && sky.models.empty()) {
-        reader.report("models",
-                      "the sky " + enclosed(sky.name, '"') + " has " + std::to_string(sky.clouds) +
-                          " clouds and no base model",
-                      "expected at least one name in `models`");
-    }
-}
-
-void check_layer_name(const SectionReader& reader, const std::string& name) {
-    const auto allowed = [](char c) {
-        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-        return letter || (c >= '0' && c <= '9') || c == '-' || c == '_';
-    };
-    if (name.size() <= 64 && std::ranges::all_of(name, allowed) && !name.starts_with('-')) return;
-    reader.report(
-        "name",
-        reader.quoted("name") + " is " + enclosed(shortened(name), '"') + ", which makes no file names",
-        "expected 1 to 64 letters, digits, `-` or `_`, not starting with `-`");
-}
-
-// Checks the skies that a layer names: at least one, and no two of one state.
-void check_layer_skies(const SectionReader& reader, const Scene& scene, const LayerOptions& layer) {
-    if (reader.find("skies") == nullptr) {
-        reader.report("skies", reader.quoted("skies") + " is missing",
-                      "expected the name of a sky or several, or a `veil`");
-        return;
-    }
-    if (layer.skies.empty()) {
-        reader.report("skies", "the layer " + enclosed(layer.name, '"') + " has no sky",
-                      "expected at least one");
-    }
-    std::vector<const NamedSky*> known;
-    for (std::size_t s = 0; s < layer.skies.size(); ++s) {
-        const Node& node = text_item(reader, "skies", s);
-        const auto found = std::ranges::find(scene.skies, layer.skies[s], &NamedSky::name);
-        if (found == scene.skies.end()) continue;  // check_references()
-        const NamedSky& sky = *found;
-        const auto twin = std::ranges::find(known, sky.state, [](const NamedSky* k) { return k->state; });
-        if (twin != known.end()) {
-            reader.document.report(node.place,
-                                   reader.quoted("skies") + ": \"" + (*twin)->name + "\" and \"" + sky.name +
-                                       "\" have the same state " + number_text(sky.state),
-                                   "expected skies of different states in one layer");
-        }
-        known.push_back(&sky);
-    }
-}
-
 // Keys that are missing take the values of the scene, or of other keys of the layer.
 void fill_in_lattice(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
-    const SectionReader lattice = below(reader, "lattice");
+    const SectionReader lattice = reader.below("lattice");
     const AutomatonOptions& shared = scene.automaton;
     if (!lattice.find("cells")) layer.extent = shared.extent;
     if (!lattice.find("cell_size_m")) layer.placement.cell_size_m = shared.placement.cell_size_m;
@@ -193,7 +27,7 @@ void fill_in_lattice(const SectionReader& reader, const Scene& scene, LayerOptio
 }
 
 void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
-    const SectionReader lattice = below(reader, "lattice"), background = below(reader, "background");
+    const SectionReader lattice = reader.below("lattice"), background = reader.below("background");
     const AutomatonOptions& shared = scene.automaton;
     fill_in_lattice(reader, scene, layer);
     fill_in_centres(layer.scatters, layer.extent, layer.placement);
@@ -206,7 +40,7 @@ void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& laye
     if (!background.find("hum")) layer.background.hum = shared.field.background.hum;
     if (!background.find("act")) layer.background.act = shared.field.background.act;
     if (!background.find("ext")) layer.background.ext = shared.field.background.ext;
-    if (!below(reader, "coupling").find("min_semi_axis_m")) {
+    if (!reader.below("coupling").find("min_semi_axis_m")) {
         layer.coupling.min_semi_axis_m = layer.placement.cell_size_m;
     }
     if (!reader.find("cross_edges_whole")) layer.cross_edges_whole = layer.automaton;
@@ -256,13 +90,13 @@ void fill_in_base_height(const SectionReader& reader, const Scene& scene, LayerO
 }
 
 void check_rain(const SectionReader& reader, const LayerOptions& layer) {
-    const SectionReader rain = below(reader, "rain");
+    const SectionReader rain = reader.below("rain");
     if (layer.rain.find && !layer.automaton) {
         rain.report("find", rain.quoted("find") + " is true in a layer without automaton",
                     "expected `automaton` = true, or rain that is placed or attached");
     }
     if (layer.rain.column.bottom_m >= layer.rain.column.top_m) {
-        const SectionReader column = below(rain, "column");
+        const SectionReader column = rain.below("column");
         column.report(column.find("top_m") ? "top_m" : "bottom_m",
                       column.quoted("bottom_m") + " = " + number_text(layer.rain.column.bottom_m) +
                           " is not below `top_m` = " + number_text(layer.rain.column.top_m),
@@ -284,7 +118,7 @@ void check_presence(const SectionReader& reader, const LayerOptions& layer) {
     }
     for (std::size_t n = 1; n < layer.presence.size(); ++n) {
         if (layer.presence[n].state > layer.presence[n - 1].state) continue;
-        const SectionReader item = rule_of(reader, "presence", n);
+        const SectionReader item = reader.item("presence", n);
         item.report("state", item.quoted("state") + " is " + number_text(layer.presence[n].state) +
                                  ", not above the one before it",
                     "expected states that rise");
@@ -295,7 +129,7 @@ void check_presence(const SectionReader& reader, const LayerOptions& layer) {
 void check_base_of_genus(const SectionReader& reader, const Entry& genus, const Scene& scene, double base_m) {
     const Range heights = bases_of_genus(genus, scene);
     if (base_m >= heights.min && base_m <= heights.max) return;
-    const SectionReader veil = below(reader, "veil");
+    const SectionReader veil = reader.below("veil");
     veil.report("base_m",
                 veil.quoted("base_m") + " is " + number_text(base_m) + "; bases of " + genus.value.text +
                     " lie from " + number_text(heights.min) + " to " + number_text(heights.max) + " m",
@@ -309,7 +143,7 @@ void place_by_genus(const SectionReader& reader, const Entry& genus, const Scene
     const double base_m = (heights.min + heights.max) / 2;
     layer.veil.base_m = base_m;
     double& bottom = layer.placement.origin_m.z;
-    if (!below(reader, "lattice").find("origin_m")) bottom = base_m;
+    if (!reader.below("lattice").find("origin_m")) bottom = base_m;
     if (base_m >= bottom && base_m < bottom + layer.extent.z * layer.placement.cell_size_m) return;
     reader.report("genus",
                   "the base of a veil of " + genus.value.text + ", the middle of " + number_text(heights.min) +
@@ -319,7 +153,7 @@ void place_by_genus(const SectionReader& reader, const Entry& genus, const Scene
 
 // Fills in the heights of a veil: those of the file, of its genus, or of the lattice.
 void fill_in_heights_of_veil(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
-    const SectionReader veil = below(reader, "veil");
+    const SectionReader veil = reader.below("veil");
     const Entry* genus = reader.find("genus");
     const bool has_base = veil.find("base_m") != nullptr;
     if (genus && has_base) check_base_of_genus(reader, *genus, scene, layer.veil.base_m);
@@ -338,7 +172,7 @@ void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOpt
                       "`detail` alone: a veil has no "
                       "clouds and no automaton");
     }
-    const SectionReader lattice = below(reader, "lattice"), veil = below(reader, "veil");
+    const SectionReader lattice = reader.below("lattice"), veil = reader.below("veil");
     if (lattice.find("boundaries") != nullptr) {
         lattice.report("boundaries", lattice.quoted("boundaries") + " stands beside `veil`",
                        "expected none: a veil is a function of place and goes on beyond its lattice");
@@ -378,7 +212,7 @@ void check_reach_of_clouds(const SectionReader& reader, const LayerOptions& laye
         const SectionReader& there = table.table.entries.empty() ? reader : table;
         check_periodic_reach(there, what, largest, reach, horizontal, vertical);
     };
-    const SectionReader coupling = below(reader, "coupling"), rain = below(reader, "rain");
+    const SectionReader coupling = reader.below("coupling"), rain = reader.below("rain");
     Vec3 of_boxes{};
     for (const CloudShape& shape : sky.shapes())
         for (const SeedBox& box : shape.cloud.boxes)
@@ -396,19 +230,19 @@ void check_reach_of_clouds(const SectionReader& reader, const LayerOptions& laye
         const PlacedRain& placed = layer.rain.placed[n];
         if (placed.intensity_mm_per_h <= 0) continue;
         const Ellipsoid area{.semi_axes_m = {placed.semi_a_m, placed.semi_b_m, 0}, .yaw_deg = placed.yaw_deg};
-        check_periodic_reach(rule_of(rain, "placed", n), {}, largest, reach_m(area),
+        check_periodic_reach(rain.item("placed", n), {}, largest, reach_m(area),
                              placed.semi_a_m >= placed.semi_b_m ? "semi_a_m" : "semi_b_m", "semi_a_m");
     }
     for (std::size_t n = 0; n < layer.rain.attached.size(); ++n) {
         if (layer.rain.attached[n].intensity_mm_per_h <= 0) continue;
-        const SectionReader reader_of_rule = rule_of(rain, "attached", n);
+        const SectionReader reader_of_rule = rain.item("attached", n);
         check_periodic_reach(
             reader_of_rule,
             "the rain of the largest cloud, scaled by " + reader_of_rule.quoted("size_scale") + ",", largest,
             largest_rain(layer.rain.attached[n], sky), "size_scale", "size_scale");
     }
     if (!layer.rain.placed.empty() || !layer.rain.attached.empty() || layer.rain.find)
-        check_table(below(rain, "column"), "the humid column `" + rain.path + ".column`",
+        check_table(rain.below("column"), "the humid column `" + rain.path + ".column`",
                     {0, 0, (column.top_m - column.bottom_m) / 2}, "top_m", "top_m");
 }
 
@@ -443,7 +277,7 @@ void check_tile(const SectionReader& reader, const Scene& scene) {
     };
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
         const LayerOptions& layer = scene.layers[n];
-        const SectionReader item = item_of(reader, "layer", n), lattice = below(item, "lattice");
+        const SectionReader item = reader.item("layer", n), lattice = item.below("lattice");
         if (!has_density(layer)) {
             item.report("automaton", "the layer " + enclosed(layer.name, '"') + " of a tile has no density",
                         "expected `automaton` = true: clouds drawn as billboards do not repeat");
@@ -477,7 +311,7 @@ void check_count_of_detailed(const SectionReader& reader, const Scene& scene) {
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
         if (!has_density(scene.layers[n]) || !layer_detail(scene, n).enabled) continue;
         if (++count <= kMaxDetailedClouds) continue;
-        item_of(reader, "layer", n)
+        reader.item("layer", n)
             .report("detail", std::to_string(count_detailed(scene)) + " layers with detail are too many",
                     "expected at most " + std::to_string(kMaxDetailedClouds) +
                         ", and `detail.enabled = false` in the others");
@@ -503,17 +337,13 @@ void check_layers_or_field(const SectionReader& reader, const Scene& scene) {
 }  // namespace
 
 void finish_layers(const SectionReader& reader, Scene& scene) {
-    if (reader.sound({"model"})) check_names_differ(reader, "model", scene.models, "base model");
     check_references(reader, scene);
     if (!reader.sound({"model", "models", "sky", "climate", "layer", "lattice", "field"})) return;
     check_layers_or_field(reader, scene);
-    check_names_differ(reader, "sky", scene.skies, "sky");
-    check_names_differ(reader, "layer", scene.layers, "layer");
-    for (std::size_t s = 0; s < scene.skies.size(); ++s) check_sky(item_of(reader, "sky", s), scene.skies[s]);
+    check_skies(reader, scene);
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
-        const SectionReader item = item_of(reader, "layer", n);
+        const SectionReader item = reader.item("layer", n);
         LayerOptions& layer = scene.layers[n];
-        check_layer_name(item, layer.name);
         check_presence(item, layer);
         check_slab(item, layer);
         check_wind_times(item, layer.wind);
@@ -522,7 +352,6 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
             finish_veil_layer(item, scene, layer);
             continue;
         }
-        check_layer_skies(item, scene, layer);
         fill_in(item, scene, layer);
         fill_in_base_height(item, scene, layer);
         check_rain(item, layer);
@@ -530,7 +359,7 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
     if (!scene.layers.empty() && reader.document.problems.empty()) check_tile(reader, scene);
     if (!reader.document.problems.empty()) return;
     for (std::size_t n = 0; n < scene.layers.size(); ++n)
-        check_simulation(item_of(reader, "layer", n), scene, n);
+        check_simulation(reader.item("layer", n), scene, n);
     check_count_of_detailed(reader, scene);
 }
 

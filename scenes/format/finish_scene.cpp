@@ -58,12 +58,9 @@ void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
     const AutomatonOptions& o = scene.automaton;
     const Vec3 largest = largest_reach_m(o.extent, o.placement.cell_size_m, o.boundaries);
     const auto check_items = [&](const char* name, const auto& check_item) {
-        const Entry* items = below(reader, "field").find(name);
-        for (std::size_t n = 0; items != nullptr && n < items->value.items.size(); ++n) {
-            check_item(
-                n, SectionReader{
-                       reader.document, items->value.items[n], indexed(std::string("field.") + name, n), {}});
-        }
+        const SectionReader field = reader.below("field");
+        const Entry* items = field.find(name);
+        for (std::size_t n = 0; items != nullptr && n < items->value.items.size(); ++n) check_item(n, field.item(name, n));
     };
     check_items("ellipsoids", [&](std::size_t n, const SectionReader& item) {
         check_periodic_reach(item, {}, largest, reach_m(o.field.ellipsoids[n]), "semi_axes_m", "semi_axes_m");
@@ -165,8 +162,7 @@ void finish_wind_fields(const SectionReader& reader, Scene& scene) {
         if (std::isinf(field.bottom_m)) field.bottom_m = placement.origin_m.z;
         if (std::isinf(field.top_m)) field.top_m = top_m;
         if (field.kind == WindFieldKind::grid || field.bottom_m < field.top_m) continue;
-        const SectionReader item{
-            reader.document, reader.find("wind_field")->value.items[n], indexed("wind_field", n), {}};
+        const SectionReader item = reader.item("wind_field", n);
         item.report("kind",
                     "the field ends at " + number_text(field.top_m) + " m and begins at " +
                         number_text(field.bottom_m) + " m",

@@ -102,6 +102,10 @@ struct SectionReader {
     // Returns the key's number; `otherwise` when it is missing or no number.
     double number(std::string_view key, double otherwise) const;
     void report(std::string_view key, std::string message, std::string expected = {}) const;
+    // Returns the reader of a table within this one; of an empty one when it is missing.
+    SectionReader below(std::string_view key) const;
+    // Returns the reader of an item of an array of tables, which is there.
+    SectionReader item(std::string_view array, std::size_t index) const;
 };
 
 // A name that users expect in a section although another key has its meaning.

@@ -246,7 +246,7 @@ void finish_background_keyframe(const SectionReader& reader, void* owner) {
     const Entry* entry = reader.find("levels");
     for (std::size_t n = 1; entry != nullptr && n < levels.size(); ++n) {
         if (levels[n].height_m > levels[n - 1].height_m) continue;
-        const SectionReader level{reader.document, entry->value.items[n], indexed(reader.path + ".levels", n), {}};
+        const SectionReader level = reader.item("levels", n);
         level.report("height_m",
                      level.quoted("height_m") + " is " + number_text(levels[n].height_m) +
                          ", not above the level before it at " + number_text(levels[n - 1].height_m),
@@ -274,7 +274,7 @@ void finish_field(const SectionReader& reader, void* owner) {
     for (std::size_t n = 0; n < field.grids.size(); ++n) {
         const auto first = std::ranges::find(field.grids, field.grids[n].of, &ProbabilityGrid::of);
         if (first == field.grids.begin() + std::ptrdiff_t(n)) continue;
-        const SectionReader item{reader.document, reader.find("grids")->value.items[n], indexed("field.grids", n), {}};
+        const SectionReader item = reader.item("grids", n);
         item.report("of", item.quoted("of") + " has a file already", "expected one file for a probability");
     }
 }

@@ -58,9 +58,8 @@ void finish_sun_path(const SectionReader& reader, const Sun& sun, std::vector<Su
                       "expected either `path` or `date` and `time`");
         return;
     }
-    const std::vector<Node>& items = reader.find("path")->value.items;
     for (std::size_t n = 0; n < path.size(); ++n) {
-        const SectionReader key{reader.document, items[n], indexed(reader.path + ".path", n), {}};
+        const SectionReader key = reader.item("path", n);
         if (key.find("colour") == nullptr) path[n].colour = sun.colour;
         if (n == 0 || path[n].time_s > path[n - 1].time_s) continue;
         key.report("time_s",
