@@ -122,7 +122,8 @@ def by_nephos(name, cloud, volume, options):
             "ground.height_m": "100000", "light.ambient_top": listed(SKY), "light.ambient_base": listed(SKY),
             "light.phase": '"henyey_greenstein"', "light.g": options.g, "camera.exposure": '"manual"', "camera.tone_curve": '"exponential"', "camera.glare": 0,
             "ground.pattern": '"plain"', "detail.strength": 0, "detail.thermals": 0, "detail.apron_cells": 0,
-            "detail.to_horizon": "false"}  # Cycles draws the voxels as they are
+            "detail.to_horizon": "false",  # Cycles draws the voxels as they are,
+            "density.metaball_radius_cells": 1}  # ... linear between them: opacities are then the same to 0.004
     words = [each for key, value in keys.items() for each in ("--set", f"{key}={value}")]
     words += [each for setting in options.set for each in ("--set", setting)]
     run(options.nephos, "render", volume, "--scene", ROOT / "scenes/cumulus.toml", "--up", cloud.get("up", "z"),
