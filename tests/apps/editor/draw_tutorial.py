@@ -5,6 +5,7 @@ it made. Usage: draw_tutorial.py [NEPHOS], on a machine with xvfb-run."""
 
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -96,13 +97,14 @@ def main():
     nephos = str(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else SOURCE / "build/release/bin/nephos").resolve())
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
+        shutil.copytree(SOURCE / "scenes", folder / "scenes")  # so that the pictures show no folder of this machine
         walk(nephos, HERE / "tutorial.txt", folder)
         for number, (script, scene) in enumerate([
                 (PARCELS, "cumulus"), (MODEL, "torchelsen/cloud-4"), (LIVE, "climate"), (VOXELS, "cumulus"),
                 (SIMULATIONS, "cumulus"), (GRID, "torchelsen/cloud-4")]):
             path = folder / f"walk-{number}.txt"
             path.write_text(script, encoding="utf-8")
-            walk(nephos, path, folder, str(SOURCE / f"scenes/{scene}.toml"))
+            walk(nephos, path, folder, f"scenes/{scene}.toml")
         for picture in sorted(folder.glob("*.png")):
             with Image.open(picture) as image:
                 image.convert("RGB").save(PICTURES / (picture.stem + ".jpg"), quality=88)
