@@ -22,9 +22,10 @@ ADDRESS = {"heap-overflow": "heap-buffer-overflow", "stack-overflow": "stack-buf
            "use-after-free": "heap-use-after-free", "leak": "LeakSanitizer: detected memory leaks"}
 UNDEFINED = {"signed-overflow": "signed integer overflow", "shift": "shift exponent 40 is too large",
              "misaligned": "misaligned address"}
-NOTICED = {"asan": {**ADDRESS, **UNDEFINED},
+CAST = {"float-cast": "is outside the range of representable values"}
+NOTICED = {"asan": {**ADDRESS, **UNDEFINED, **CAST},
            "fuzz": {**ADDRESS, **UNDEFINED},
-           "ubsan": {**UNDEFINED, "float-cast": "is outside the range of representable values"},
+           "ubsan": {**UNDEFINED, **CAST},
            "tsan": {"race": "ThreadSanitizer: data race"}}
 MEMCHECK = {"heap-overflow": "Invalid read of size 1", "use-after-free": "Invalid read of size 1",
             "uninitialised": "depends on uninitialised value", "leak": "definitely lost"}

@@ -86,6 +86,8 @@ TEST(AvailableMemory, SurvivesAnyContent) {
     EXPECT_EQ(system.available().bytes, kMost);
 }
 
+// Sanitizers take more addresses.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(AvailableMemory, IsWhatTheAddressSpaceLeaves) {
     rlimit before{};
     ASSERT_EQ(getrlimit(RLIMIT_AS, &before), 0);
@@ -99,6 +101,7 @@ TEST(AvailableMemory, IsWhatTheAddressSpaceLeaves) {
     EXPECT_EQ(limited.bytes, kLimit) << "without proc/self/statm nothing is taken yet";
     EXPECT_EQ(limited.limit, "address space limit of the process (ulimit -v)");
 }
+#endif
 
 TEST(AvailableMemory, OfThisMachineIsPlausible) {
     const AvailableMemory available = available_memory();
