@@ -109,7 +109,7 @@ struct WaitingRays {
         for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(d)) {
             const Floats distance = hn::Load(d, state.distance + at), left = hn::Load(d, sums.transmittance + at),
                          stop = hn::Min(hn::Load(d, state.end + at), limit),
-                         opaque = hn::Mul(set(shader::kMarchOpaque), hn::Load(d, sums.opaque + at));
+                         opaque = hn::Mul(set(shader::kMarchOpaqueFactor), hn::Load(d, sums.opaque + at));
             const Mask go_on = hn::And(hn::Lt(distance, stop), hn::Gt(left, opaque));
             if (hn::AllFalse(d, go_on)) continue;
             // Full vectors are stored, each over the idle end of the one before.

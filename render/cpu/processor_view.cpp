@@ -150,21 +150,22 @@ const BillboardTexels* ProcessorView::texels() const {
     return source_.empty() ? nullptr : &billboard_texels(order_->pictures);
 }
 
-TileSums::TileSums(const PictureFrame& frame, int left, int top) : TileSums() {
+TileSums::TileSums(const PictureFrame& frame, int x, int y) : TileSums() {
     if (!(frame.sun_disc.w > 0)) return;
     const auto of = [](const shader::vec4& axis) { return Vec3(double(axis.x), double(axis.y), double(axis.z)); };
     const Vec3 right = of(frame.right), up = of(frame.up), forward = of(frame.forward), to_sun = of(frame.to_sun);
-    const auto apart = [&](double column, double row) {
-        const double x = 2 * (column + left + double(frame.picture.z)) / double(frame.picture.x) - 1,
-                     y = 1 - 2 * (row + top + double(frame.picture.w)) / double(frame.picture.y);
-        return float(glm::distance(glm::normalize(forward + x * right + y * up), to_sun));
+    // A chord of the unit sphere, from a place in the tile.
+    const auto chord_to_sun = [&](double column, double row) {
+        const double across = 2 * (column + x + double(frame.picture.z)) / double(frame.picture.x) - 1,
+                     above = 1 - 2 * (row + y + double(frame.picture.w)) / double(frame.picture.y);
+        return float(glm::distance(glm::normalize(forward + across * right + above * up), to_sun));
     };
     constexpr float kHalfTile = 10;  // pixels, at least half of its diagonal
-    const float of_middle = apart(0.5 * shader::kTileWidth, 0.5 * shader::kTileHeight);
-    if (opaque_beside_sun(of_middle - kHalfTile / frame.up.w, frame.up.w) == shader::kOpaque) return;
+    const float chord = chord_to_sun(0.5 * shader::kTileWidth, 0.5 * shader::kTileHeight) - kHalfTile / frame.up.w;
+    if (opaque_beside_sun(frame, chord) == shader::kOpaque) return;
     for (std::size_t n = 0; n < kPixels; ++n)
         opaque[n] = opaque_beside_sun(
-            apart(double(n % shader::kTileWidth) + 0.5, double(n / shader::kTileWidth) + 0.5), frame.up.w);
+            frame, chord_to_sun(double(n % shader::kTileWidth) + 0.5, double(n / shader::kTileWidth) + 0.5));
 }
 
 void ProcessorView::light(Batch& batch, const VisibleSet* seen) const {

@@ -28,7 +28,7 @@ struct TileSums {
         std::fill_n(transmittance, kPixels, 1.0f);
         std::fill_n(opaque, kPixels, shader::kOpaque);
     }
-    // Of the tile whose first pixel this is, which may have the sun's disc in it.
+    // Empty sums of the tile whose upper left pixel this is; `opaque` is lower where the sun's disc is behind.
     TileSums(const PictureFrame& frame, int x, int y);
 };
 

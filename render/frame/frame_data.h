@@ -34,10 +34,11 @@ struct Daylight {
 };
 Daylight daylight(double sun_elevation_deg);
 
-// Returns the transmittance below which nothing is seen behind what is before it, along a ray that is `apart` from the direction
-// to the sun, a chord of the unit sphere, in a picture of so many pixels per unit at distance 1 that has the sun's disc.
-inline float opaque_beside_sun(float apart, float pixels_per_unit) {
-    return (apart - shader::kSunRadius) * pixels_per_unit < 1.0f ? shader::kSunOpaque : shader::kOpaque;
+// Returns the transmittance below which nothing is seen behind what is before it. `chord`: of the unit sphere, from the ray to
+// the direction to the sun.
+inline float opaque_beside_sun(const shader::FrameUniforms& frame, float chord) {
+    const bool sun = frame.sun_disc.w > 0 && (chord - shader::kSunRadius) * frame.up.w < 1.0f;
+    return sun ? shader::kSunOpaque : shader::kOpaque;
 }
 
 // Uniforms with pointers to the data that is in images on the device, for back-ends on the processor.

@@ -95,7 +95,7 @@ MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& c
 void MarchState::find_next(const float* transmittance, const float* opaque) {
     next = std::numeric_limits<float>::max();
     for (std::size_t n = 0; n < kPixels; ++n)
-        if (distance[n] < end[n] && transmittance[n] > shader::kMarchOpaque * opaque[n]) next = std::min(next, distance[n]);
+        if (distance[n] < end[n] && transmittance[n] > shader::kMarchOpaqueFactor * opaque[n]) next = std::min(next, distance[n]);
     done = next == std::numeric_limits<float>::max();
 }
 

@@ -296,11 +296,11 @@ float march_end(vec3 ray) {
     return min(end, ground_distance(ray));
 }
 
-// Marches a ray up to a distance. `sum`: radiance and transmittance. Where there is nothing to march, do not call it:
-// lavapipe goes through the body of a loop once, even if no invocation does.
-void march_to(float stop, vec3 ray, inout MarchState state, inout vec4 sum, inout float sum_distance) {
+// Marches a ray up to a distance. `least`: opaque_along() it. `sum`: radiance and transmittance. Where there is nothing to
+// march, do not call it: lavapipe goes through the body of a loop once, even if no invocation does.
+void march_to(float stop, vec3 ray, float least, inout MarchState state, inout vec4 sum, inout float sum_distance) {
     vec3 per_ray = inverse_of(ray);
-    float opaque = kMarchOpaque * opaque_along(ray);
+    float opaque = kMarchOpaqueFactor * least;  // the same for all that look whether the ray goes on
     MarchEvent event = MarchEvent(0.0, 0.0, 0u, false);
     while (state.distance < stop && sum.a > opaque) {
         event.full = false;

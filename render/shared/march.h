@@ -13,7 +13,8 @@ namespace nephos::shader {
 NEPHOS_CONST uint kMostVolumes = 16u;                 // in a picture
 NEPHOS_CONST float kEventOpacity = 0.12f;             // of a point that is shaded
 NEPHOS_CONST float kLeavingOpacity = 0.004f;          // of one where the ray leaves cloud
-NEPHOS_CONST float kMarchOpaque = 64.0f;              // transmittance at which a ray ends, times that at which nothing is seen
+// A ray ends at this many times the transmittance behind which nothing is seen.
+NEPHOS_CONST float kMarchOpaqueFactor = 64.0f;
 NEPHOS_CONST float kLeastStep_m = 1.0f;               // in cloud of cells of 40 m and more,
 NEPHOS_CONST float kStepPixels = 0.6f;                // ... or this many footprints of a pixel
 NEPHOS_CONST float kMostStepNodes = 2.0f;             // ... in a cloud that repeats at most this many half cells

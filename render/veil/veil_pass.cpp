@@ -24,6 +24,7 @@ Rgb rgb(const shader::vec4& v) { return {double(v.x), double(v.y), double(v.z)};
 Sheet sheet_of(const VeilPass& pass, const DrawnVeil& veil) {
     Sheet sheet;
     sheet.veil = &veil;
+    sheet.frame = &pass.frame;
     sheet.base_m = veil.slab->base_m() - pass.eye_m.z;
     sheet.top_m = veil.slab->top_m() - pass.eye_m.z;
     const shader::vec4& sun = pass.frame.to_sun;
@@ -136,7 +137,9 @@ struct Row {
             for (std::size_t c = 0; c < 3; ++c) {
                 float& beauty = picture.beauty[3 * (first + x) + c];
                 const float own = air.beta[c][x] * float(seen[x].light[c]) + (1 - through) * air.light[c][x];
-                beauty = behind ? beauty + left * (own - (1 - through) * sky[c][x]) : through * beauty + own;
+                const float covered = beauty + left * (own - (1 - through) * sky[c][x]);
+                // The sky may have a sun that is 60,000 times as bright as white: rounding of it must not be darker than black.
+                beauty = behind ? std::max(covered, 0.0f) : through * beauty + own;
             }
             const float opacity = 1 - left, more = 1 - through;
             const float mine = behind ? left * more : more, others = behind ? opacity : through * opacity;

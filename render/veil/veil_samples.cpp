@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <glm/geometric.hpp>
+
 #include "render/frame/frame_data.h"
 #include "render/options/halo_phase.h"
 #include "render/options/phase_function.h"
@@ -22,8 +24,9 @@ constexpr double kPartDepth = 0.5;  // optical, of a part of a step, where the d
 constexpr int kMostParts = 6;       // of a step
 constexpr int kStepsAtOnce = 4;     // of a run
 constexpr std::size_t kRuns = 1024;
-// Transmittance, times that below which nothing is seen: what remains is less than a step of a picture of 8 bits.
-constexpr double kOpaque = 8;
+// A ray ends at this many times the transmittance behind which nothing is seen: beside the sun what remains is less than a step
+// of a picture of 8 bits.
+constexpr double kOpaqueFactor = 8;
 
 // Fraction of the light that meets prisms of ice and leaves through two of their sides in this way.
 constexpr double kHaloPerPrism = 0.12;
@@ -88,8 +91,8 @@ void SampleGroup::flush() {
 void SampleGroup::prepare_light(Run& run, double column) const {
     const VeilView& view = sheet_.veil->view;
     run.cosine = run.ray.x * sheet_.to_sun.x + run.ray.y * sheet_.to_sun.y + run.ray.z * sheet_.to_sun.z;
-    const double apart = std::sqrt(std::max(0.0, 2 * (1 - run.cosine)));
-    run.opaque = kOpaque * double(opaque_beside_sun(float(apart), float(1 / sheet_.per_pixel)));
+    const double chord = glm::distance(Vec3(run.ray.x, run.ray.y, run.ray.z), sheet_.to_sun);
+    run.opaque = kOpaqueFactor * double(opaque_beside_sun(*sheet_.frame, float(chord)));
     if (view.light == VeilLighting::two_samples) {
         // v = -ray; h . v = sqrt((1 + l . v) / 2).
         const double half = std::sqrt(std::clamp(0.5 * (1 - run.cosine), 0.0, 1.0));

@@ -17,6 +17,7 @@
 
 #include "render/options/options.h"
 #include "render/veil/drawn_veil.h"
+#include "render/shared/shared.h"
 #include "render/veil/sheet_light.h"
 #include "render/veil/slab_path.h"
 
@@ -28,6 +29,7 @@ inline constexpr double kMostSunPath_m = 20'000;    // in the sheet
 // A veil as the rays of a picture meet it.
 struct Sheet {
     const DrawnVeil* veil = nullptr;
+    const shader::FrameUniforms* frame = nullptr;  // of the picture; not null
     double base_m = 0, top_m = 0;  // above the eye
     Vec3 to_sun{};
     double sun_cosine = 1;  // >= kLeastSunCosine

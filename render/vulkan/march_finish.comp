@@ -36,7 +36,7 @@ void main() {
     terrain_end = terrain_at(pixel);
     MarchState state = load_march(index);
     float sum_distance = step.distances != 0u ? depth[index] : 0.0;
-    march_to(march_end(ray), ray, state, clouds, sum_distance);
+    march_to(march_end(ray), ray, opaque, state, clouds, sum_distance);
     if (clouds.a < opaque) clouds.a = 0.0;
     clouds.rgb += clouds.a * background(ray);
     radiance[index] = clouds;

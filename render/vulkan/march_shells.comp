@@ -46,7 +46,7 @@ void main() {
     uint k = drawn.x;
     while (k < drawn.y) {
         // Air alone, up to the shell with the next sample.
-        bool marches = state.distance < end && sum.a > kMarchOpaque * opaque;
+        bool marches = state.distance < end && sum.a > kMarchOpaqueFactor * opaque;
         uint next = marches ? max(k, min(shells_before(state.distance), drawn.y)) : drawn.y;
         for (uint n = max(k, first); n < min(next, last); ++n) {
             AirLayer air = air_shell(n, sunlit, ray, pixel);
@@ -55,7 +55,7 @@ void main() {
             sum.a *= air.transmittance;
         }
         k = next;
-        if (k < drawn.y) march_to(min(end, shell_end(k)), ray, state, sum, sum_distance);
+        if (k < drawn.y) march_to(min(end, shell_end(k)), ray, opaque, state, sum, sum_distance);
     }
     store_march(index, state);
     radiance[index] = sum;

@@ -51,7 +51,7 @@ void main() {
         // Splats alone, up to that behind the next sample.
         float limit_m = min(end, distance_of(list[i]));
         while (i < range.end && transmittance[0] >= opaque[0] &&
-               (state.distance >= limit_m || transmittance[0] <= kMarchOpaque * opaque[0])) {
+               (state.distance >= limit_m || transmittance[0] <= kMarchOpaqueFactor * opaque[0])) {
             uint index = list[i++];
             if (kBillboards && unpackHalf2x16(tails[index]).y < 0.0) {
                 add_billboard(splats[index].x, pixel);
@@ -60,9 +60,9 @@ void main() {
             }
             if (i < range.end) limit_m = min(end, distance_of(list[i]));
         }
-        if (i < range.end && transmittance[0] > kMarchOpaque * opaque[0]) {
+        if (i < range.end && transmittance[0] > kMarchOpaqueFactor * opaque[0]) {
             vec4 sum = vec4(red[0], green[0], blue[0], transmittance[0]);
-            march_to(limit_m, ray, state, sum, mean_distance[0]);
+            march_to(limit_m, ray, opaque[0], state, sum, mean_distance[0]);
             red[0] = sum.r;
             green[0] = sum.g;
             blue[0] = sum.b;

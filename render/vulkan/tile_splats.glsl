@@ -22,7 +22,7 @@ layout(constant_id = 4) const bool kDistances = true;
 
 float red[kRows], green[kRows], blue[kRows], mean_distance[kRows], transmittance[kRows];
 float per_square[kRows];  // 1 / |direction|^2 of each pixel
-float opaque[kRows];      // opaque_along() it
+float opaque[kRows];      // opaque_along() each pixel's ray
 float ends[kRows];        // terrain_at() each pixel
 
 void add(uint row, float opacity, vec3 colour, float distance) {
