@@ -199,11 +199,11 @@ void add_nested(std::string& out, const Section& section, const void* owner, con
         if (std::find(done.begin(), done.end(), key.section) != done.end()) continue;
         done.push_back(key.section);
         const bool many = key.kind == KeyKind::tables;
-        const std::string key_path = path.empty() ? key.name : path + "." + key.name;
+        const std::string here = key_path(path, key.name);
         const void* inner = many ? key.element_defaults : key.value(const_cast<void*>(owner));
         add_section(out, *key.section, inner,
-                    enclosed((many ? "[[" : "[") + key_path + (many ? "]]" : "]"), '`'));
-        add_nested(out, *key.section, inner, key_path, done);
+                    enclosed((many ? "[[" : "[") + here + (many ? "]]" : "]"), '`'));
+        add_nested(out, *key.section, inner, here, done);
     }
 }
 

@@ -337,10 +337,10 @@ void check_layers_or_field(const SectionReader& reader, const Scene& scene) {
 }  // namespace
 
 void finish_layers(const SectionReader& reader, Scene& scene) {
-    check_references(reader, scene);
+    check_models_and_references(reader, scene);
     if (!reader.sound({"model", "models", "sky", "climate", "layer", "lattice", "field"})) return;
     check_layers_or_field(reader, scene);
-    check_skies(reader, scene);
+    check_skies_and_layer_names(reader, scene);
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
         const SectionReader item = reader.item("layer", n);
         LayerOptions& layer = scene.layers[n];

@@ -15,7 +15,7 @@ namespace nephos {
 namespace {
 
 // Returns the reader of a section of the scene, or of the scene itself when the file has no such section.
-SectionReader below(const SectionReader& reader, std::string_view name) {
+SectionReader section_or_scene(const SectionReader& reader, std::string_view name) {
     const Entry* entry = reader.find(name);
     if (entry == nullptr || entry->value.kind != Node::Kind::table) return reader;
     return {reader.document, entry->value, std::string(name), {}};
@@ -75,7 +75,7 @@ void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
 
 void check_frames(const SectionReader& reader, const Scene& scene) {
     if (!reader.document.frames_checked || !reader.sound({"time", "frames"}) || !scene.frames.enabled) return;
-    const SectionReader frames = below(reader, "frames");
+    const SectionReader frames = section_or_scene(reader, "frames");
     const double end_s = simulated_time_s(scene);
     const std::string simulated =
         number_text(end_s) + " s that `time.steps` = " + std::to_string(scene.steps) +
@@ -90,7 +90,7 @@ void check_frames(const SectionReader& reader, const Scene& scene) {
     if (scene.frames.count == 0) {
         if (frame_count(scene) < kMaxFrames) return;
         const bool with_scale = frames.find("time_scale") != nullptr;
-        const SectionReader at = with_scale ? frames : below(reader, "time");
+        const SectionReader at = with_scale ? frames : section_or_scene(reader, "time");
         at.report(with_scale ? "time_scale" : "steps",
                   "the scene has more than " + std::to_string(kMaxFrames) + " frames",
                   "expected a larger `frames.time_scale`, fewer `time.steps`, or a `frames.count`");
@@ -201,7 +201,7 @@ void check_velocity_name(const SectionReader& reader, const Scene& scene) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
     };
     if (!reader.sound({"density"})) return;
-    const SectionReader density = below(reader, "density");
+    const SectionReader density = section_or_scene(reader, "density");
     const bool good = !name.empty() && name.size() <= 60 && std::all_of(name.begin(), name.end(), allowed);
     if (!good || name == "density" || name == "hum" || name == "act" || name == "cld") {
         density.report(
@@ -222,7 +222,7 @@ void repeat_lattice(const SectionReader& reader, Scene& scene) {
     if (given == nullptr || given->value.find("boundaries") == nullptr) {
         boundaries.x = boundaries.y = Boundary::periodic;
     } else if (boundaries.x != Boundary::periodic || boundaries.y != Boundary::periodic) {
-        below(reader, "lattice")
+        section_or_scene(reader, "lattice")
             .report("boundaries", "`lattice.boundaries` is open in a tile",
                     "expected [\"periodic\", \"periodic\", \"open\"], or none");
     }
@@ -231,7 +231,7 @@ void repeat_lattice(const SectionReader& reader, Scene& scene) {
 // What a height map's name says of its file, before anybody reads it.
 void check_height_map(const SectionReader& reader, const TerrainOptions& terrain) {
     if (!terrain.height_map || !reader.sound({"ground", "terrain"})) return;
-    const SectionReader ground = below(reader, "ground"), about = below(reader, "terrain");
+    const SectionReader ground = section_or_scene(reader, "ground"), about = section_or_scene(reader, "terrain");
     const HeightFormat format = height_format(*terrain.height_map);
     if (format == HeightFormat::none) {
         ground.report("height_map",

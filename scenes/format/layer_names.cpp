@@ -106,7 +106,7 @@ void check_layer_skies(const SectionReader& reader, const Scene& scene, const La
     for (std::size_t s = 0; s < layer.skies.size(); ++s) {
         const Node& node = text_item(reader, "skies", s);
         const auto found = std::ranges::find(scene.skies, layer.skies[s], &NamedSky::name);
-        if (found == scene.skies.end()) continue;  // check_references()
+        if (found == scene.skies.end()) continue;  // check_models_and_references()
         const NamedSky& sky = *found;
         const auto twin = std::ranges::find(known, sky.state, [](const NamedSky* k) { return k->state; });
         if (twin != known.end()) {
@@ -121,7 +121,7 @@ void check_layer_skies(const SectionReader& reader, const Scene& scene, const La
 
 }  // namespace
 
-void check_references(const SectionReader& reader, const Scene& scene) {
+void check_models_and_references(const SectionReader& reader, const Scene& scene) {
     if (reader.sound({"model"})) check_names_differ(reader, "model", scene.models, "base model");
     const auto all_named = [&](const char* array, const auto& items) {
         const Entry* entry = reader.find(array);
@@ -157,7 +157,7 @@ void check_references(const SectionReader& reader, const Scene& scene) {
     }
 }
 
-void check_skies(const SectionReader& reader, const Scene& scene) {
+void check_skies_and_layer_names(const SectionReader& reader, const Scene& scene) {
     check_names_differ(reader, "sky", scene.skies, "sky");
     check_names_differ(reader, "layer", scene.layers, "layer");
     for (std::size_t s = 0; s < scene.skies.size(); ++s) check_sky(reader.item("sky", s), scene.skies[s]);

@@ -11,10 +11,6 @@
 namespace nephos {
 namespace {
 
-std::string key_path(const std::string& section_path, const std::string& name) {
-    return section_path.empty() ? name : section_path + "." + name;
-}
-
 // Finds the paths of keys with this name in other sections: "density.half".
 void find_namesakes(const Section& section, const std::string& path, std::string_view name,
                     std::vector<std::string>& found) {

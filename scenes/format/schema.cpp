@@ -31,16 +31,16 @@ std::string numbers_text(const Key& key, std::string_view what) {
     return out;
 }
 
-std::string full_path(const std::string& section, std::string_view key) {
-    std::string full = section;
-    if (!section.empty() && !key.empty()) full += '.';
-    full += key;
-    return full;
-}
-
 }  // namespace
 
-std::string SectionReader::quoted(std::string_view key) const { return enclosed(full_path(path, key), '`'); }
+std::string key_path(std::string_view section, std::string_view key) {
+    std::string path(section);
+    if (!section.empty() && !key.empty()) path += '.';
+    path += key;
+    return path;
+}
+
+std::string SectionReader::quoted(std::string_view key) const { return enclosed(key_path(path, key), '`'); }
 
 bool SectionReader::sound(std::initializer_list<std::string_view> names) const {
     return std::none_of(names.begin(), names.end(), [this](std::string_view name) {
@@ -68,11 +68,11 @@ SectionReader SectionReader::below(std::string_view key) const {
     static const Node empty;
     const Entry* entry = find(key);
     const bool there = entry != nullptr && entry->value.kind == Node::Kind::table;
-    return {document, there ? entry->value : empty, full_path(path, key), {}};
+    return {document, there ? entry->value : empty, key_path(path, key), {}};
 }
 
 SectionReader SectionReader::item(std::string_view array, std::size_t index) const {
-    return {document, find(array)->value.items[index], indexed(full_path(path, array), index), {}};
+    return {document, find(array)->value.items[index], indexed(key_path(path, array), index), {}};
 }
 
 const Key* Section::find(std::string_view name) const {

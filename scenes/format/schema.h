@@ -102,9 +102,9 @@ struct SectionReader {
     // Returns the key's number; `otherwise` when it is missing or no number.
     double number(std::string_view key, double otherwise) const;
     void report(std::string_view key, std::string message, std::string expected = {}) const;
-    // Returns the reader of a table within this one; of an empty one when it is missing.
+    // Returns the reader of a table within this one; of an empty one when it is missing, or no table.
     SectionReader below(std::string_view key) const;
-    // Returns the reader of an item of an array of tables, which is there.
+    // Returns the reader of an item of an array of tables. The array must have this item.
     SectionReader item(std::string_view array, std::size_t index) const;
 };
 
@@ -131,6 +131,9 @@ const Section& scene_section();
 
 // Returns the key at a path of names without indices ("field", "scatters", "count"); null when there is none.
 const Key* find_key(const std::vector<std::string>& path);
+
+// Returns the path of a key of a section: key_path("sun", "date") is "sun.date". Either may be empty.
+std::string key_path(std::string_view section, std::string_view key);
 
 // Returns the expected value of a key for messages: "a number from -18 to 90, in degrees".
 std::string expected_text(const Key& key);

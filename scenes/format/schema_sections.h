@@ -85,12 +85,12 @@ void check_periodic_reach(const SectionReader& reader, const std::string& what, 
 
 // Performs the part of finish_scene() on models, skies, climate and layers.
 void finish_layers(const SectionReader& reader, Scene& scene);
-// Reports models of one name, and names of models and skies that are not in the scene: also beside other problems, as long
-// as all models, or skies, have names that could be read.
-void check_references(const SectionReader& reader, const Scene& scene);
-// Reports skies and layers whose names are empty, not their own or no file's, skies without models, and layers whose skies
-// are none or of one state.
-void check_skies(const SectionReader& reader, const Scene& scene);
+// Reports models that share a name, and names of models and skies that are not in the scene: also beside other problems, as
+// long as all models, or skies, have names that could be read.
+void check_models_and_references(const SectionReader& reader, const Scene& scene);
+// Reports skies and layers whose name is empty, is used twice or cannot be part of a file's name; skies without models; and
+// layers without a sky or with two skies of one state.
+void check_skies_and_layer_names(const SectionReader& reader, const Scene& scene);
 
 // Sets the ranges of centres that the scene leaves out to the whole lattice.
 void fill_in_centres(std::vector<EllipsoidScatter>& scatters, const Extent& extent,

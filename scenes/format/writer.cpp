@@ -88,15 +88,15 @@ void write_section(std::string& out, const Section& section, const void* owner, 
     for (const Key& key : section.keys) {
         if ((key.kind != KeyKind::table && key.kind != KeyKind::tables) || !is_written(section, key, owner))
             continue;
-        const std::string key_path = path.empty() ? key.name : path + "." + key.name;
+        const std::string here = key_path(path, key.name);
         const void* value = value_of(key, owner);
         if (key.kind == KeyKind::table) {
-            if (has_plain_keys(*key.section)) out += "\n[" + key_path + "]\n";
-            write_section(out, *key.section, value, key_path);
+            if (has_plain_keys(*key.section)) out += "\n[" + here + "]\n";
+            write_section(out, *key.section, value, here);
             continue;
         }
         for (std::size_t n = 0; n < key.size(value); ++n) {
-            out += "\n[[" + key_path + "]]\n";
+            out += "\n[[" + here + "]]\n";
             const void* element = key.element(value, n);
             for (const Key& inner : key.section->keys) {
                 if (!is_written(*key.section, inner, element)) continue;
