@@ -86,7 +86,7 @@ TEST(AvailableMemory, SurvivesAnyContent) {
     EXPECT_EQ(system.available().bytes, kMost);
 }
 
-// Sanitizers take more addresses.
+// The shadow memory of sanitizers is larger than the limit that is set here.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(AvailableMemory, IsWhatTheAddressSpaceLeaves) {
     rlimit before{};
