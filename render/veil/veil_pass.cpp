@@ -137,9 +137,12 @@ struct Row {
             for (std::size_t c = 0; c < 3; ++c) {
                 float& beauty = picture.beauty[3 * (first + x) + c];
                 const float own = air.beta[c][x] * float(seen[x].light[c]) + (1 - through) * air.light[c][x];
-                const float covered = beauty + left * (own - (1 - through) * sky[c][x]);
+                if (!behind) {
+                    beauty = through * beauty + own;
+                    continue;
+                }
                 // The sky may have a sun that is 60,000 times as bright as white: rounding of it must not be darker than black.
-                beauty = behind ? std::max(covered, 0.0f) : through * beauty + own;
+                beauty = std::max(beauty + left * (own - (1 - through) * sky[c][x]), 0.0f);
             }
             const float opacity = 1 - left, more = 1 - through;
             const float mine = behind ? left * more : more, others = behind ? opacity : through * opacity;

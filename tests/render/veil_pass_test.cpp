@@ -210,6 +210,8 @@ TEST(VeilPass, TwoSampleLightIsThatOfAScalarTwin) {
                              .bounce_power = 2};
     Sheet sheet;
     sheet.veil = &veil;
+    const shader::FrameUniforms frame{};  // of a picture without the sun
+    sheet.frame = &frame;
     sheet.base_m = 1000;
     sheet.top_m = 2000;
     sheet.to_sun = {std::sqrt(0.75), 0, 0.5};
