@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names of models, skies and layers: each once, and what refers to one by its name.
+// Checks that the names of models, skies and layers differ, and that what refers to one by its name finds it.
 
 #include <algorithm>
 #include <string>
@@ -12,7 +12,7 @@
 namespace nephos {
 namespace {
 
-// The item of an array of texts, or the text alone.
+// Returns the item of an array of texts, or the text alone.
 const Node& text_item(const SectionReader& reader, std::string_view key, std::size_t index) {
     const Node& node = reader.find(key)->value;
     return node.kind == Node::Kind::array ? node.items[index] : node;

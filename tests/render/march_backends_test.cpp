@@ -169,7 +169,7 @@ TEST_F(MarchBackends, AgreeThroughAir) {
     }
 }
 
-// What dims the sun ten thousand times leaves its disc brighter than all around it: it must not be taken for opaque.
+// Requires that cloud which dims the sun ten thousand times is not taken for opaque: the disc is brighter than all around it.
 TEST_F(MarchBackends, TheSunShinesThroughThickCloud) {
     RenderOptions options = test::view({0, -2000, 500}, {480, 400, 1210}, 3, 96, 72);
     const Vec3 way = options.camera.target_m - options.camera.position_m;
