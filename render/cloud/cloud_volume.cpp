@@ -176,7 +176,12 @@ void light_by_sun(std::span<CloudVolume> volumes, std::span<const DiffusionCells
             std::ranges::transform(of_brick, &volume.sun_depths[brick * kLightNodesOfBrick], packed_depth);
         };
         tbb::parallel_for(std::size_t{0}, volume.field.places().size(), pack);
-        volume.diffuse = diffuses(light) ? diffuse_sunlight(cells[n], depths[n], to_sun, light.albedo) : DiffuseLight{};
+        volume.diffuse = {};
+        if (!diffuses(light)) continue;
+        if (is_thick(cells[n], volume.field.extinction_per_m()))
+            volume.diffuse = diffuse_sunlight(halved(cells[n], volume.extinction), &cells[n], depths[n], to_sun, light.albedo);
+        else
+            volume.diffuse = diffuse_sunlight(cells[n], nullptr, depths[n], to_sun, light.albedo);
     }
 }
 
@@ -186,7 +191,7 @@ void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const Clo
                    const DepthOfOthers& others) {
     std::vector<DiffusionCells> cells;
     for (std::size_t n = 0; n < volumes.size() && (are_new || diffuses(light)); ++n)
-        cells.emplace_back(volumes[n].field, volumes[n].extinction, mean_cosine(light.phase));
+        cells.push_back(wide_cells(volumes[n].field, volumes[n].extinction, mean_cosine(light.phase)));
     const auto see_surroundings = [&] {
         for (std::size_t n = 0; n < volumes.size() && are_new; ++n)
             volumes[n].surroundings = diffuse_surroundings(cells[n]);
@@ -256,7 +261,7 @@ float equivalent_depth_at(const CloudVolume& volume, const Vec3& place_m, float 
     const double outwards =
         kTowardsEye * std::hypot(double(sideways & 255u) - 128, double(sideways >> 8) - 128) / 127;
     const double diffuse = 0.25 * double(shader::kMostFluence) * root * root *
-                           (double(shader::kDiffuseBase) + double(shader::kDiffuseFlux) * g * outwards);
+                           (double(shader::kDiffuseBase) + double(shader::diffuse_flux(float(g))) * outwards);
     const double near = 0.25 * (std::exp((g - 1) * double(sun_depth)) - std::exp(-double(sun_depth)));
     return float(std::max(1 / std::max(diffuse + near, 1e-3) - 1, 0.0) / (1.5 * std::max(1 - g, 0.01)));
 }

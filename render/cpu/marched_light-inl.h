@@ -159,7 +159,7 @@ HWY_INLINE Floats scattered_in_volume(const ViewScene& scene, const MarchedVolum
     const Floats along = dot({hn::MulSub(side.low, unit, none), hn::MulSub(side.high, unit, none),
                               hn::MulSub(up.high, unit, none)},
                              ray);
-    const Floats directed = hn::Max(hn::NegMulAdd(set(shader::kDiffuseFlux * march.mean_cosine), along,
+    const Floats directed = hn::Max(hn::NegMulAdd(set(shader::diffuse_flux(march.mean_cosine)), along,
                                                   set(shader::kDiffuseBase)),
                                     hn::Zero(Lanes()));
     const Floats one = set(1.0f), decay = set(shader::kDiffuseDecay * (1 - march.mean_cosine));

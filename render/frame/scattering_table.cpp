@@ -11,6 +11,7 @@
 #include <glm/gtc/packing.hpp>
 
 #include "render/options/droplet_phase.h"
+#include "render/shared/march.h"
 #include "render/shared/shared.h"
 
 namespace nephos {
@@ -40,15 +41,14 @@ double diffuse_light(const CloudLight& light, double depth) {
     return 1 / (1 + 1.5 * (1 - mean_cosine(light.phase)) * depth);
 }
 
-// Diffusion has too little light on its way back near lit surfaces: slabs of optical depth 5 to 80 are up to an eighth too
-// dark from the side of the sun. This, in units of 1/4 (1 - g) ((1 - cos) / 2)^2, gives them their albedo within 6 %
-// (tests/render/diffuse_light_test.cpp).
-constexpr double kTurnedBack = 3.5;
-
-// Of light that was scattered forwards a few times, pi times what is scattered into an angle.
+// Of light that was scattered forwards a few times, pi times what is scattered into an angle. Diffusion has too little of
+// it and of light on its way back near lit surfaces, which 1/4 (1 - g) ((1 - cos) / 2)^2 stands for. The factors are chosen
+// for the albedo of slabs (tests/render/diffuse_light_test.cpp) and against Cycles (docs/lighting.md).
 double scattered_forwards(const PhaseFunction& function, double cos_theta) {
-    const double directed = std::max(mean_cosine(function), 0.0), back = 0.5 * (1 - cos_theta);
-    return kPi * phase(function, cos_theta, directed) + 0.25 * kTurnedBack * (1 - directed) * back * back;
+    const double directed = std::max(mean_cosine(function), 0.0), back = 0.5 * (1 - cos_theta),
+                 broad = double(shader::broad_scattering(float(directed)));
+    return (1 + 0.6 * broad) * kPi * phase(function, cos_theta, directed) +
+           0.25 * (3.5 - 1.5 * broad) * (1 - directed) * back * back;
 }
 
 void add_diffusion(const CloudLight& light, std::vector<float>& table) {

@@ -56,7 +56,7 @@ float scattered_in_volume(uint v, vec3 ray, float sun_depth, BrickPlace here) {
     vec2 up = volume_bytes(v, 2u, here), side = volume_bytes(v, 3u, here);
     float root = up.x * (1.0 / 255.0);
     vec3 flux = vec3(side, up.y) * (1.0 / 127.0) - 128.0 / 127.0;
-    float directed = max(kDiffuseBase - kDiffuseFlux * march.mean_cosine * dot(flux, ray), 0.0);
+    float directed = max(kDiffuseBase - diffuse_flux(march.mean_cosine) * dot(flux, ray), 0.0);
     float decay = kDiffuseDecay * (1.0 - march.mean_cosine);
     float relief = (1.0 + decay * volume_sun_depth(v, here)) / (1.0 + decay * sun_depth);
     float diffuse = root * root * min(relief, kMostRelief) * directed * (0.25 * kMostFluence);

@@ -45,10 +45,10 @@ NEPHOS_CONST float kLeastMargin = 1.0e-4f;            // difference of two sampl
 NEPHOS_CONST float kTap0_m = 3.0f, kTap1_m = 10.0f, kTap2_m = 22.0f;
 NEPHOS_CONST float kTap0Length_m = 6.5f, kTap1Length_m = 9.5f, kTap2Length_m = 14.5f;
 NEPHOS_CONST float kTapsEnd_m = 30.5f;
-// Light that diffuses (render/cloud/diffusion.h): of fluence f and flux F, 1/4 (kDiffuseBase f + kDiffuseFlux g omega F)
-// is scattered towards omega, by Eddington's approximation. Deep in a cloud and where light leaves it that is right; near
+// Light that diffuses (render/cloud/diffusion.h): of fluence f and flux F, 1/4 (kDiffuseBase f + diffuse_flux(g) omega F)
+// is scattered towards omega, by Eddington's approximation, which has 3 g. Deep in a cloud and where light leaves it that is right; near
 // lit surfaces it misses light that soon turned back, which the scattering table has (render/frame/scattering_table.h).
-NEPHOS_CONST float kDiffuseBase = 1.0f, kDiffuseFlux = 3.0f;
+NEPHOS_CONST float kDiffuseBase = 1.0f, kDiffuseFlux = 3.0f, kBroadFlux = 0.3f;
 // By how much diffuse light falls off with a depth that the lattice does not know: as 1 / (1 + kDiffuseDecay (1 - g)
 // depth), diffusion through a slab; and the most that a bump has more than the lattice.
 NEPHOS_CONST float kDiffuseDecay = 1.5f, kMostRelief = 2.0f;
@@ -65,6 +65,16 @@ NEPHOS_CONST uint kLargeNoiseWords = 2097152u;        // those of the small nois
 // pixel. Larger cells have larger bumps, and their metaballs take over at footprints that are larger in proportion.
 NEPHOS_CONST float kFootprintCell_m = 40.0f;
 NEPHOS_CONST float kMarchedFootprint_m = 60.0f, kSplattedFootprint_m = 100.0f;
+
+// Returns how far scattering with a mean cosine is from being narrowly forwards, 0 to 1: what diffusion is fitted by.
+NEPHOS_FUNCTION float broad_scattering(float mean_cosine) {
+    float rest = 1.0f - mean_cosine;
+    return min(4.0f * rest * rest, 1.0f);
+}
+
+NEPHOS_FUNCTION float diffuse_flux(float mean_cosine) {
+    return (kDiffuseFlux + kBroadFlux * broad_scattering(mean_cosine)) * mean_cosine;
+}
 
 // Returns the weight of metaballs whose pixels have a footprint: 0 to 1, without a step.
 NEPHOS_FUNCTION float splatted_weight(float footprint_m) {

@@ -84,7 +84,7 @@ TEST(DiffuseLight, SlabsHaveTheAlbedoOfTheTwoStreamSolution) {
     // is scattered little forwards.
     const std::pair<double, double> limits[] = {{0.85, 0.04}, {0.7, 0.04}, {0.5, 0.06}};
     for (const auto& [g, limit] : limits) {
-        for (const double depth : {5.0, 20.0, 80.0}) {
+        for (const double depth : {5.0, 20.0, 80.0, 320.0}) {  // the last in cells of the lattice, else in wide ones
             const DetailedVoxels part = slab(depth);
             double albedo = 0;
             for (int n = 0; n < 5; ++n)
@@ -113,7 +113,7 @@ TEST(DiffuseLight, SlabsAreBrighterUnderALowSun) {
             const double expected = two_stream_albedo(depth, g, mu);
             std::printf("g %.2f, optical depth %2.0f, sun at 35 degrees: albedo %.3f, two-stream %.3f (%+.1f %%)\n", g,
                         depth, albedo, expected, 100 * (albedo / expected - 1));
-            EXPECT_NEAR(albedo, expected, 0.07 * expected) << "g " << g << ", depth " << depth;
+            EXPECT_NEAR(albedo, expected, 0.08 * expected) << "g " << g << ", depth " << depth;
             EXPECT_GT(albedo, two_stream_albedo(depth, g)) << "g " << g << ", depth " << depth;
         }
     }

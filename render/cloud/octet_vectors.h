@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Vectors of the cells of a brick, and of their neighbours, for diffusion_cells.cpp. Private to the module.
+// Vectors of the cells of an octet, and of their neighbours, for diffusion_cells.cpp and diffusion_solver.cpp. Private to the module.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <numeric>
+#include <span>
 #include <type_traits>
+#include <vector>
+
+#include <tbb/parallel_for.h>
 
 #include "render/cloud/diffusion_cells.h"
 
 namespace nephos {
 
-// Half a brick, the lower or the upper four cells. Every processor has vectors of four: longer ones would gain little,
-// as loops over all bricks wait for memory, and all instruction sets compute alike.
+// Half an octet, the lower or the upper four cells. Every processor has vectors of four: longer ones would gain little,
+// as loops over all octets wait for memory, and all instruction sets compute alike.
 using Quad = float __attribute__((vector_size(16)));
 struct Cells {
     Quad low, high;
@@ -22,12 +28,12 @@ struct Cells {
 
 inline Quad number(float value) { return Quad{value, value, value, value}; }
 inline Cells same(float value) { return {number(value), number(value)}; }
-inline Cells load(const BrickOfCells& from) {
+inline Cells load(const Octet& from) {
     Cells cells;
     std::memcpy(&cells, from.of.data(), sizeof cells);
     return cells;
 }
-inline void store(const Cells& cells, BrickOfCells& to) { std::memcpy(to.of.data(), &cells, sizeof cells); }
+inline void store(const Cells& cells, Octet& to) { std::memcpy(to.of.data(), &cells, sizeof cells); }
 template <class What, class... More>
 Cells each(const What& what, const Cells& first, const More&... more) {
     return {what(first.low, more.low...), what(first.high, more.high...)};
@@ -76,11 +82,11 @@ Cells exchanged(const Cells& cells) {
         return {cells.high, cells.low};
 }
 
-// The outer neighbours: of the upper cells in the brick above, of the lower ones in that below.
+// The outer neighbours: of the upper cells in the octet above, of the lower ones in that below.
 template <int kAxis, class Load>
-Cells outer(const std::array<std::int32_t, 6>& beside, const Load& of_brick) {
-    return exchanged<kAxis>(halves<kAxis>(of_brick(std::size_t(beside[2 * kAxis])),
-                                          of_brick(std::size_t(beside[2 * kAxis + 1]))));
+Cells outer(const std::array<std::int32_t, 6>& beside, const Load& of_octet) {
+    return exchanged<kAxis>(halves<kAxis>(of_octet(std::size_t(beside[2 * kAxis])),
+                                          of_octet(std::size_t(beside[2 * kAxis + 1]))));
 }
 
 // Calls what(axis) for the three axes.
@@ -93,12 +99,35 @@ void for_axes(const What& what) {
 
 // Calls what(axis, cells that are inner neighbours, those that are outer ones) for the three axes.
 template <class Load, class What>
-void for_neighbours(const DiffusionCells& cells, std::size_t brick, const Load& of_brick, const What& what) {
-    const auto& beside = cells.beside[brick];
-    const Cells own = of_brick(brick);
+void for_neighbours(const DiffusionCells& cells, std::size_t octet, const Load& of_octet, const What& what) {
+    const auto& beside = cells.beside[octet];
+    const Cells own = of_octet(octet);
     for_axes([&](auto axis) {
         constexpr int kAxis = decltype(axis)::value;
-        what(axis, exchanged<kAxis>(own), outer<kAxis>(beside, of_brick));
+        what(axis, exchanged<kAxis>(own), outer<kAxis>(beside, of_octet));
+    });
+}
+
+inline Quad loss(Quad thickness) {
+    return 1 / (2 + 1.5f * thickness);
+}
+
+// Numbers of some octets.
+using Octets = std::span<const std::int32_t>;
+
+inline std::vector<std::int32_t> first_octets(std::size_t count) {
+    std::vector<std::int32_t> numbers(count);
+    std::iota(numbers.begin(), numbers.end(), 0);
+    return numbers;
+}
+
+inline constexpr std::size_t kOctetsOfPart = 256;  // that one thread works on, whose products are added up first
+
+// Calls what(number of the part, its octets) for all parts, in parallel.
+template <class What>
+void for_parts(Octets octets, const What& what) {
+    tbb::parallel_for(std::size_t{0}, (octets.size() + kOctetsOfPart - 1) / kOctetsOfPart, [&](std::size_t part) {
+        what(part, octets.subspan(part * kOctetsOfPart, std::min(kOctetsOfPart, octets.size() - part * kOctetsOfPart)));
     });
 }
 
