@@ -262,7 +262,8 @@ float equivalent_depth_at(const CloudVolume& volume, const Vec3& place_m, float 
         kTowardsEye * std::hypot(double(sideways & 255u) - 128, double(sideways >> 8) - 128) / 127;
     const double diffuse = 0.25 * double(shader::kMostFluence) * root * root *
                            (double(shader::kDiffuseBase) + double(shader::diffuse_flux(float(g))) * outwards);
-    const double near = 0.25 * (std::exp((g - 1) * double(sun_depth)) - std::exp(-double(sun_depth)));
+    const double near = 0.25 * double(shader::forward_light(float(g))) *
+                        std::max(std::exp((g - 1) * double(sun_depth)) - std::exp(-double(sun_depth)), 0.0);
     return float(std::max(1 / std::max(diffuse + near, 1e-3) - 1, 0.0) / (1.5 * std::max(1 - g, 0.01)));
 }
 

@@ -15,7 +15,8 @@ namespace nephos {
 namespace {
 
 // Conductance between cells that hold next to nothing, as light does not get from one to the other faster than it travels.
-// Wide cells: of more the iterations would only take longer; cells of the lattice: for the light of fringes (docs/lighting.md).
+// Of more in wide cells the iterations would only take longer; that of cells of the lattice suits thin edges of clouds best
+// (docs/lighting.md).
 constexpr float kMostOfWideCells = 10, kMostOfCells = 7;
 constexpr float kFold = 1e-6f;  // reduced optical thickness of an empty cell in a fold
 
@@ -157,7 +158,7 @@ void connect(DiffusionCells& cells) {
     for_parts(cells.active, [&](std::size_t, Octets some) { set_conductances(some, cells); });
 }
 
-// Wide cells with cloud, not in folds, are octets, and so are those beside them: these are next to all folds.
+// Wide cells with cloud, not in folds, are octets, and so are those beside them, in which all folds are.
 void number_octets(const DiffusionCells& wide, DiffusionCells& cells) {
     std::vector<std::uint8_t> near(kDiffusionCells * wide.octets);
     for (const std::int32_t brick : wide.active) {

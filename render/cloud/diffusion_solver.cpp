@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/cloud/diffusion_solver.h"
 
-#include <cmath>
+#include <algorithm>
 #include <numeric>
 #include <utility>
 
@@ -271,9 +271,11 @@ void collect_light(const DiffusionCells& cells, const std::vector<Octet>& fluenc
 }
 
 constexpr double kSmallResidual = 1e-3;  // relative, which ends the iterations
-constexpr double kSmallResidualOfHalves = 5e-3, kSmallResidualOfWide = 0.1;  // of the former, and of its guesses
 constexpr int kMostRounds = 200;
-constexpr int kRoundsOfHalves = 4;  // between two solutions on wide cells
+// Of the solution in two levels: of its end, of what wide cells add in a turn, and steps on the fine ones in a turn.
+constexpr double kSmallResidualOfTwo = 5e-3, kSmallResidualOfWide = 0.1;
+constexpr int kRoundsOfTurn = 4;
+constexpr double kNoLight = 1e-24;  // square of a fluence that no byte of a node shows
 
 // Sums are those of parts in their order, whatever the number of threads.
 template <class Number>
@@ -283,6 +285,9 @@ double sum_over_parts(Octets octets, const Number& number) {
     return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
+// Less than a residual that counts, or than one of hardly any light: numbers next to 0 have no digits to go on with.
+double small_product(double relative, double product) { return std::max(relative * relative * product, kNoLight); }
+
 double residual_product(const DiffusionCells& cells, const Iteration& it) {
     return sum_over_parts(cells.active, [&](Octets some) { return residual_product(some, it); });
 }
@@ -291,33 +296,35 @@ Iteration begin(const DiffusionCells& cells, const std::vector<Octet>& source, d
     Iteration it;
     for (auto* each : {&it.inverse, &it.diagonal, &it.fluence, &it.direction, &it.image}) each->resize(cells.octets + 1);
     it.residual = source;
+    it.residual.resize(cells.octets + 1);
     const float absorbed = (1 - float(albedo)) / (1 - cells.mean_cosine);
     for_parts(cells.active, [&](std::size_t, Octets some) { set_diagonal(cells, absorbed, some, it); });
     return it;
 }
 
 // Conjugate gradients, with the diagonal as preconditioner (M. R. Hestenes and E. Stiefel 1952), until residual_product()
-// is `small`.
-void improve(const DiffusionCells& cells, int rounds, double small, Iteration& it) {
-    double product = residual_product(cells, it);
+// is `small`. `product`: that at first. Returns that at last.
+double improve(const DiffusionCells& cells, int rounds, double small, double product, Iteration& it) {
     float keep = 0;
     for (int round = 0; round < rounds && product > small; ++round) {
         for_parts(cells.active, [&](std::size_t, Octets some) { turn(keep, some, it); });
         const double curvature =
             sum_over_parts(cells.active, [&](Octets some) { return set_image(cells, some, it); });
+        if (!(curvature > 0)) break;
         const auto length = float(product / curvature);
         const double next = sum_over_parts(cells.active, [&](Octets some) { return step(length, some, it); });
         keep = float(next / product);
         product = next;
     }
+    return product;
 }
 
 // The residual of wide cells is that of the eight cells in each, as their faces are four times as large. Their fluence is 0.
-void take_residual(const DiffusionCells& halves, const Iteration& from, Octets some, Iteration& it) {
+void take_residual(const DiffusionCells& fine, const Iteration& from, Octets some, Iteration& it) {
     for (const std::int32_t brick : some) {
         Octet& residual = it.residual[std::size_t(brick)];
         for (std::size_t cell = 0; cell < kDiffusionCells; ++cell) {
-            const Cells of = load(from.residual[halves.octet_of(brick, cell)]);
+            const Cells of = load(from.residual[fine.octet_of(brick, cell)]);
             residual.of[cell] = 0.25f * float(sum_of(of.low) + sum_of(of.high));
         }
         store(where_positive(load(it.inverse[std::size_t(brick)]), load(residual)), residual);
@@ -326,26 +333,27 @@ void take_residual(const DiffusionCells& halves, const Iteration& from, Octets s
 }
 
 // Sets the direction to the fluence of wide cells.
-void turn_to(const DiffusionCells& halves, const std::vector<Octet>& fluence, Octets some, Iteration& it) {
+void turn_to(const DiffusionCells& fine, const std::vector<Octet>& fluence, Octets some, Iteration& it) {
     for (const std::int32_t one : some) {
         const auto octet = std::size_t(one);
-        const float wide = fluence[halves.brick_of(octet)].of[halves.within_brick(octet)];
-        store(where_positive(load(halves.thickness[octet]), same(wide)), it.direction[octet]);
+        const float wide = fluence[fine.brick_of(octet)].of[fine.within_brick(octet)];
+        store(where_positive(load(fine.thickness[octet]), same(wide)), it.direction[octet]);
     }
 }
 
-// Goes as far in the direction as brings the fluence nearest to the solution.
-void go_on(const DiffusionCells& cells, Iteration& it) {
+// Goes as far in the direction as brings the fluence nearest to the solution. Returns residual_product().
+double go_on(const DiffusionCells& cells, Iteration& it) {
     const double curvature = sum_over_parts(cells.active, [&](Octets some) { return set_image(cells, some, it); });
-    if (!(curvature > 0)) return;
-    const double product = sum_over_parts(cells.active, [&](Octets some) { return residual_along(some, it); });
-    sum_over_parts(cells.active, [&](Octets some) { return step(float(product / curvature), some, it); });
+    if (!(curvature > 0)) return residual_product(cells, it);
+    const double along = sum_over_parts(cells.active, [&](Octets some) { return residual_along(some, it); });
+    const auto length = float(along / curvature);
+    return sum_over_parts(cells.active, [&](Octets some) { return step(length, some, it); });
 }
 
 }  // namespace
 
 std::vector<Octet> light_from_outside(const DiffusionCells& cells, const FluenceOutside& outside) {
-    std::vector<Octet> source(cells.octets);
+    std::vector<Octet> source(cells.octets + 1);
     for_parts(cells.active, [&](std::size_t, Octets some) {
         take_light(cells, outside, some, source);
     });
@@ -364,20 +372,22 @@ SharedLight share_light(const DiffusionCells& cells, const std::vector<StartingL
 
 std::vector<Octet> solve(const DiffusionCells& cells, const std::vector<Octet>& source, double albedo) {
     Iteration it = begin(cells, source, albedo);
-    improve(cells, kMostRounds, kSmallResidual * kSmallResidual * residual_product(cells, it), it);
+    const double product = residual_product(cells, it);
+    improve(cells, kMostRounds, small_product(kSmallResidual, product), product, it);
     return std::move(it.fluence);
 }
 
-std::vector<Octet> solve(const DiffusionCells& halves, const DiffusionCells& wide, const std::vector<Octet>& source,
-                         double albedo) {
-    Iteration it = begin(halves, source, albedo), roughly = begin(wide, std::vector<Octet>(wide.octets + 1), albedo);
-    const double small = kSmallResidualOfHalves * kSmallResidualOfHalves * residual_product(halves, it);
-    for (int round = 0; round < kMostRounds && residual_product(halves, it) > small; round += kRoundsOfHalves) {
-        for_parts(wide.active, [&](std::size_t, Octets some) { take_residual(halves, it, some, roughly); });
-        improve(wide, kMostRounds, kSmallResidualOfWide * kSmallResidualOfWide * residual_product(wide, roughly), roughly);
-        for_parts(halves.active, [&](std::size_t, Octets some) { turn_to(halves, roughly.fluence, some, it); });
-        go_on(halves, it);
-        improve(halves, kRoundsOfHalves, small, it);
+std::vector<Octet> solve(const DiffusionCells& fine, const DiffusionCells& wide, const std::vector<Octet>& source,
+                         double albedo, int most_turns) {
+    Iteration it = begin(fine, source, albedo), rough = begin(wide, {}, albedo);
+    double product = residual_product(fine, it);
+    const double small = small_product(kSmallResidualOfTwo, product);
+    for (int turn = 0; turn < most_turns && product > small; ++turn) {
+        for_parts(wide.active, [&](std::size_t, Octets some) { take_residual(fine, it, some, rough); });
+        const double rest = residual_product(wide, rough);
+        improve(wide, kMostRounds, small_product(kSmallResidualOfWide, rest), rest, rough);
+        for_parts(fine.active, [&](std::size_t, Octets some) { turn_to(fine, rough.fluence, some, it); });
+        product = improve(fine, kRoundsOfTurn, small, go_on(fine, it), it);
     }
     return std::move(it.fluence);
 }

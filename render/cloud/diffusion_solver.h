@@ -38,13 +38,14 @@ struct SharedLight {
 // which share its light by the resistance to them; so each axis takes its share, and all together take at most all.
 SharedLight share_light(const DiffusionCells& cells, const std::vector<StartingLight>& starting);
 
-// Returns the fluence in all cells. `source`: the light that each of them scatters first or gets from outside. `albedo`:
-// of single scattering. Results depend neither on the number of threads nor on the instruction set.
+// Returns the fluence in all cells. `source`: the light that each of them scatters first or gets from outside; the element
+// for no octet may be left out. `albedo`: of single scattering. Results depend neither on the number of threads nor on the instruction set.
 std::vector<Octet> solve(const DiffusionCells& cells, const std::vector<Octet>& source, double albedo);
 
-// Returns the same for `halves`, which are halved(wide): `wide` cells find quickly what differs over many cells.
-std::vector<Octet> solve(const DiffusionCells& halves, const DiffusionCells& wide, const std::vector<Octet>& source,
-                         double albedo);
+// Returns the same for `fine` cells, which are halved(wide), to a residual of 0.005: `wide` ones find quickly what differs
+// over many cells. It takes three to six turns.
+std::vector<Octet> solve(const DiffusionCells& fine, const DiffusionCells& wide, const std::vector<Octet>& source,
+                         double albedo, int most_turns = 50);
 
 // The light of a cell for interpolation: its weight, and the weight times fluence, and times flux to the east, north and
 // up. In places between cells light is nearest to that of the optically thinner one. A cell without cloud has the light

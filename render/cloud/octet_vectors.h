@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Vectors of the cells of an octet, and of their neighbours, for diffusion_cells.cpp and diffusion_solver.cpp. Private to the module.
+// Vectors of the cells of an octet, and of their neighbours, for diffusion_cells.cpp and diffusion_solver.cpp. Private to
+// the module.
 
 #include <algorithm>
 #include <array>
@@ -108,6 +109,7 @@ void for_neighbours(const DiffusionCells& cells, std::size_t octet, const Load& 
     });
 }
 
+// Flux through a face beyond which there is no cloud, per fluence in the middle of its cell: Marshak's condition.
 inline Quad loss(Quad thickness) {
     return 1 / (2 + 1.5f * thickness);
 }

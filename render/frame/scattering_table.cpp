@@ -41,14 +41,12 @@ double diffuse_light(const CloudLight& light, double depth) {
     return 1 / (1 + 1.5 * (1 - mean_cosine(light.phase)) * depth);
 }
 
-// Of light that was scattered forwards a few times, pi times what is scattered into an angle. Diffusion has too little of
-// it and of light on its way back near lit surfaces, which 1/4 (1 - g) ((1 - cos) / 2)^2 stands for. The factors are chosen
-// for the albedo of slabs (tests/render/diffuse_light_test.cpp) and against Cycles (docs/lighting.md).
+// Of light that was scattered forwards a few times, pi times what is scattered into an angle.
 double scattered_forwards(const PhaseFunction& function, double cos_theta) {
-    const double directed = std::max(mean_cosine(function), 0.0), back = 0.5 * (1 - cos_theta),
-                 broad = double(shader::broad_scattering(float(directed)));
-    return (1 + 0.6 * broad) * kPi * phase(function, cos_theta, directed) +
-           0.25 * (3.5 - 1.5 * broad) * (1 - directed) * back * back;
+    const double directed = std::max(mean_cosine(function), 0.0), back = 0.5 * (1 - cos_theta);
+    const auto g = float(directed);
+    return double(shader::forward_light(g)) * kPi * phase(function, cos_theta, directed) +
+           0.25 * double(shader::turned_back(g)) * (1 - directed) * back * back;
 }
 
 void add_diffusion(const CloudLight& light, std::vector<float>& table) {

@@ -7,8 +7,10 @@
 //
 // Rows of shader::kScatterAngles floats. Row 0 is pi times the phase function: single scattering, to be
 // multiplied by exp(-depth). Row 1 + i is multiple scattering at the depth of node i. The last row is that of light that
-// was scattered forwards a few times: pi times the phase function with its asymmetry g times g, and what of it soon turns
-// back. With CloudLight::bows three rows follow, of red, green and blue, which take the place of row 0. All are radiance under a sun of colour 1, that is per irradiance pi. Nodes are where shader::scatter_column() and
+// was scattered forwards a few times: pi times the phase function with its asymmetry g times g, by
+// shader::forward_light(), and what of it soon turns back, by shader::turned_back(). With CloudLight::bows three rows
+// follow, of red, green and blue, which take the place of row 0. All are radiance under a sun of colour 1, that is per
+// irradiance pi. Nodes are where shader::scatter_column() and
 // shader::scatter_row() are integers: dense where cos(theta) is near 1 or -1, and at small depths. Values are
 // interpolated linearly; largest error 0.3 % of the value at depth 0 (test `ScatteringTable`), and 2 % on the
 // flank of the aureole of the largest droplets, a tenth of a degree wide, and of asymmetries beyond 0.96.

@@ -46,9 +46,12 @@ NEPHOS_CONST float kTap0_m = 3.0f, kTap1_m = 10.0f, kTap2_m = 22.0f;
 NEPHOS_CONST float kTap0Length_m = 6.5f, kTap1Length_m = 9.5f, kTap2Length_m = 14.5f;
 NEPHOS_CONST float kTapsEnd_m = 30.5f;
 // Light that diffuses (render/cloud/diffusion.h): of fluence f and flux F, 1/4 (kDiffuseBase f + diffuse_flux(g) omega F)
-// is scattered towards omega, by Eddington's approximation, which has 3 g. Deep in a cloud and where light leaves it that is right; near
-// lit surfaces it misses light that soon turned back, which the scattering table has (render/frame/scattering_table.h).
-NEPHOS_CONST float kDiffuseBase = 1.0f, kDiffuseFlux = 3.0f, kBroadFlux = 0.3f;
+// is scattered towards omega, by Eddington's approximation, which has 3 g. Deep in a cloud and where light leaves it that
+// is right; near lit surfaces it misses light that was scattered a few times, which the scattering table has
+// (render/frame/scattering_table.h): forwards, and, in units of 1/4 (1 - g) ((1 - cos) / 2)^2, soon turned back.
+NEPHOS_CONST float kDiffuseBase = 1.0f, kDiffuseFlux = 3.0f, kForwardLight = 1.0f, kTurnedBack = 3.5f;
+// What broad scattering, broad_scattering(g) = 1, has more of these: chosen for slabs and against Cycles (docs/lighting.md).
+NEPHOS_CONST float kBroadFlux = 0.3f, kBroadForwardLight = 0.6f, kBroadTurnedBack = -1.5f;
 // By how much diffuse light falls off with a depth that the lattice does not know: as 1 / (1 + kDiffuseDecay (1 - g)
 // depth), diffusion through a slab; and the most that a bump has more than the lattice.
 NEPHOS_CONST float kDiffuseDecay = 1.5f, kMostRelief = 2.0f;
@@ -74,6 +77,12 @@ NEPHOS_FUNCTION float broad_scattering(float mean_cosine) {
 
 NEPHOS_FUNCTION float diffuse_flux(float mean_cosine) {
     return (kDiffuseFlux + kBroadFlux * broad_scattering(mean_cosine)) * mean_cosine;
+}
+NEPHOS_FUNCTION float forward_light(float mean_cosine) {
+    return kForwardLight + kBroadForwardLight * broad_scattering(mean_cosine);
+}
+NEPHOS_FUNCTION float turned_back(float mean_cosine) {
+    return kTurnedBack + kBroadTurnedBack * broad_scattering(mean_cosine);
 }
 
 // Returns the weight of metaballs whose pixels have a footprint: 0 to 1, without a step.

@@ -318,15 +318,52 @@ CloudVolume thick_block() {
     return CloudVolume(part);
 }
 
-// Wide cells change the way to the solution alone.
+// Wide cells change the way to the solution alone, and shorten it: six turns have 24 steps on the lattice's cells.
 TEST(DiffusionSolver, WideCellsLeadToTheSameSolution) {
     for (const CloudVolume& volume : {heaps(19), thick_block()}) {
         const DiffusionCells wide = wide_cells(volume.field, volume.extinction, double(kCosine)),
                              cells = halved(wide, volume.extinction);
-        const std::vector<Octet> source = light_from_outside(cells, kSky), alone = solve(cells, source, kAlbedo);
-        const double all = root_mean_square(cells, alone, std::vector<Octet>(cells.octets + 1));
-        EXPECT_GT(all, 0.1);
-        EXPECT_LT(root_mean_square(cells, solve(cells, wide, source, kAlbedo), alone), 0.01 * all);
+        const Naive naive(volume.field, cells);
+        for (const std::vector<Octet>& source :
+             {light_from_outside(cells, kSky), share_light(cells, lamps(naive, cells.octets)).source}) {
+            const std::vector<Octet> alone = solve(cells, source, kAlbedo);
+            const double all = root_mean_square(cells, alone, std::vector<Octet>(cells.octets + 1));
+            EXPECT_GT(all, 0.1);
+            const auto error = [&](int turns) {
+                return root_mean_square(cells, solve(cells, wide, source, kAlbedo, turns), alone) / all;
+            };
+            EXPECT_LT(error(6), 0.01);
+            EXPECT_GT(error(1), 2 * error(6));
+        }
+    }
+}
+
+TEST(DiffusionSolver, TwoLevelsDoNotDependOnThreads) {
+    const CloudVolume volume = thick_block();
+    const auto fluence_of = [&](int threads) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+        const DiffusionCells wide = wide_cells(volume.field, volume.extinction, double(kCosine)),
+                             cells = halved(wide, volume.extinction);
+        std::vector<float> all;
+        for (const Octet& octet : solve(cells, wide, light_from_outside(cells, kSky), kAlbedo))
+            all.insert(all.end(), octet.of.begin(), octet.of.end());
+        return all;
+    };
+    EXPECT_EQ(fluence_of(1), fluence_of(3));
+}
+
+// In the shade of others hardly any light is left to diffuse.
+TEST(DiffusionSolver, NumbersNextToNothingStayNumbers) {
+    const CloudVolume volume = thick_block();
+    const DiffusionCells wide = wide_cells(volume.field, volume.extinction, double(kCosine)),
+                         cells = halved(wide, volume.extinction);
+    for (const float light : {0.0f, 1e-30f, 1e-18f}) {
+        std::vector<Octet> source = light_from_outside(cells, kSky);
+        for (Octet& octet : source)
+            for (float& value : octet.of) value *= light;
+        for (const std::vector<Octet>& fluence : {solve(cells, wide, source, kAlbedo), solve(cells, source, kAlbedo)})
+            for (const Octet& octet : fluence)
+                for (const float value : octet.of) ASSERT_TRUE(value >= 0 && value <= 2 * light) << value;
     }
 }
 

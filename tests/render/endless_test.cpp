@@ -97,8 +97,6 @@ TEST(EndlessCloud, DepthsAreThoseBetweenManyCopies) {
 }
 
 TEST(EndlessCloud, DiffuseLightHasNoSides) {
-    const std::vector<CloudVolume> endless = lit(plain(layer(true), true), sun(205, 40)),
-                                   open = lit(plain(layer(true), false), sun(205, 40));
     const auto range = [](const CloudVolume& volume, const std::vector<std::uint16_t>& of) {
         // Of nodes in the middle of the layer, whichever brick they are in.
         int least = 255, most = 0;
@@ -113,9 +111,20 @@ TEST(EndlessCloud, DiffuseLightHasNoSides) {
         }
         return most - least;
     };
-    EXPECT_LE(range(endless[0], endless[0].diffuse.upwards), 1);
-    EXPECT_LE(range(endless[0], endless[0].surroundings), 1);
-    EXPECT_GT(range(open[0], open[0].diffuse.upwards), 4);
+    // On wide cells, and on those of the lattice.
+    for (const double extinction_per_m : {kExtinction, 6 * kExtinction}) {
+        const auto lit_layer = [&](bool to_horizon) {
+            DetailedVoxels part = plain(layer(true), to_horizon);
+            part.setting.extinction_per_m = extinction_per_m;
+            return lit(part, sun(205, 40));
+        };
+        const std::vector<CloudVolume> endless = lit_layer(true), open = lit_layer(false);
+        EXPECT_EQ(is_thick(wide_cells(open[0].field, open[0].extinction, open[0].mean_cosine), extinction_per_m),
+                  extinction_per_m > kExtinction);
+        EXPECT_LE(range(endless[0], endless[0].diffuse.upwards), 1);
+        EXPECT_LE(range(endless[0], endless[0].surroundings), 1);
+        EXPECT_GT(range(open[0], open[0].diffuse.upwards), 4);
+    }
 }
 
 class EndlessPicture : public ::testing::Test {
