@@ -56,7 +56,8 @@ PICTURES = {
        for name in ("cumulus", "stratus", "cirrus", "halo", "glory", "fogbow")},
     "splashes.jpg": (1, (960, 600), [("rain", 205, SPLASHES)]),
     "storm.jpg": (3, (480, 270), [("storm", frame, {}) for frame in (1, 24, 40, 52, 66, 80)]),
-    "nightfall.jpg": (2, (640, 360), [("nightfall", frame, {"frames.time_scale": "16800"}) for frame in (1, 2, 3, 4)]),
+    "nightfall.jpg": (2, (640, 360), [("nightfall", frame, {"frames.time_scale": "16800", "frames.count": "4"})
+                                      for frame in (1, 2, 3, 4)]),
     "wet-ground.jpg": (3, (400, 300), [("wet-ground", frame, {}) for frame in (2, 4, 5, 6, 7, 9)]),
     "detail.jpg": (2, (640, 400), [("cumulus", 40, view | off) for view in ({}, FROM_ABOVE, FROM_BELOW)
                                    for off in (NO_DETAIL, {})]),
