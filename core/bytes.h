@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Little-endian serialisation of plain values for checkpoints.
+// Little-endian serialisation of plain values for checkpoints and exported files.
 
 #include <bit>
 #include <cstddef>
@@ -49,15 +49,21 @@ class ByteReader {
         return value;
     }
     void get_bytes(std::span<std::byte> out) {
-        if (out.size() > left_.size()) throw Error(ErrorCode::io, "saved state ends early");
+        check(out.size());
         if (!out.empty()) std::memcpy(out.data(), left_.data(), out.size());
         left_ = left_.subspan(out.size());
     }
-    // Skips bytes; at most rest().size().
-    void skip(std::size_t bytes) { left_ = left_.subspan(bytes); }
+    void skip(std::size_t bytes) {
+        check(bytes);
+        left_ = left_.subspan(bytes);
+    }
     std::span<const std::byte> rest() const { return left_; }
 
   private:
+    void check(std::size_t bytes) const {
+        if (bytes > left_.size()) throw Error(ErrorCode::io, "it ends early");
+    }
+
     std::span<const std::byte> left_;
 };
 

@@ -219,6 +219,11 @@ TEST(Containers, AreReadBackAndRefuseWhatIsCut) {
         const auto expect_cut_is_refused = [&](const std::filesystem::path& path, const auto& read) {
             std::filesystem::resize_file(path, std::filesystem::file_size(path) - 30);
             EXPECT_THROW(read(), Error) << path;
+            // Within what stands before the voxels, too: fields of it must not be read behind the end.
+            for (const std::uintmax_t bytes : {200, 160, 147, 143, 140, 130, 128, 127, 80, 79, 12, 1, 0}) {
+                std::filesystem::resize_file(path, bytes);
+                EXPECT_THROW(read(), Error) << path << ", " << bytes << " bytes";
+            }
         };
         write_raw(folder / "v.raw", volume);
         const auto raw = [&] { return read_raw(folder / "v.raw", type, 32, 24, 16, 3); };
