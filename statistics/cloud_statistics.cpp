@@ -8,10 +8,10 @@
 #include "core/error.h"
 
 // Processors with AVX-512 that count bits in vectors, three times as fast as by table look-ups.
-#ifndef HWY_WANT_AVX3_DL
+#if defined(__OPTIMIZE__) && !defined(HWY_WANT_AVX3_DL)  // docs/determinism.md
 #define HWY_WANT_AVX3_DL
 #endif
-#ifndef HWY_DISABLED_TARGETS
+#if defined(__OPTIMIZE__) && !defined(HWY_DISABLED_TARGETS)
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
 #endif
 
