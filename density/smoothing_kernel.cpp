@@ -5,7 +5,7 @@
 #include <cstring>
 
 // Machines without AVX2 run the portable form: rare by now, and every target costs seconds to compile.
-#if defined(__OPTIMIZE__) && !defined(HWY_DISABLED_TARGETS)  // docs/determinism.md
+#if defined(__OPTIMIZE__) && !defined(HWY_DISABLED_TARGETS)  // with -O0 as all files (docs/determinism.md)
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
 #endif
 

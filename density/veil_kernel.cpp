@@ -4,7 +4,7 @@
 #include <cmath>
 
 // Compiled once for each SIMD target of Highway and dispatched at run time.
-#if defined(__OPTIMIZE__) && !defined(HWY_DISABLED_TARGETS)  // docs/determinism.md
+#if defined(__OPTIMIZE__) && !defined(HWY_DISABLED_TARGETS)  // with -O0 as all files (docs/determinism.md)
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
 #endif
 

@@ -8,7 +8,7 @@
 #include "core/error.h"
 
 // Processors with AVX-512 that count bits in vectors, three times as fast as by table look-ups.
-#if defined(__OPTIMIZE__) && !defined(HWY_WANT_AVX3_DL)  // docs/determinism.md
+#if defined(__OPTIMIZE__) && !defined(HWY_WANT_AVX3_DL)  // with -O0 as all files (docs/determinism.md)
 #define HWY_WANT_AVX3_DL
 #endif
 #if defined(__OPTIMIZE__) && !defined(HWY_DISABLED_TARGETS)

@@ -14,9 +14,9 @@
 namespace nephos {
 namespace {
 
-// Conductance between cells that hold next to nothing, as light does not get from one to the other faster than it travels.
-// Of more in wide cells the iterations would only take longer; that of cells of the lattice suits thin edges of clouds best
-// (docs/lighting.md).
+// Limits the conductance between cells that hold next to nothing, as light does not get from one to the other faster than it
+// travels. Between wide cells more would only lengthen the iterations; between cells of the lattice the value is fitted to thin
+// edges of clouds (docs/lighting.md).
 constexpr float kMostOfWideCells = 10, kMostOfCells = 7;
 constexpr float kFold = 1e-6f;  // reduced optical thickness of an empty cell in a fold
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr float kLeastThickness = 0.1f;  // reduced optical, of cells in the weights of their light
 
-// What conjugate gradients keep of each cell; `inverse`: of the diagonal of the equations.
+// Holds the vectors of conjugate gradients; `inverse`: of the diagonal of the equations.
 struct Iteration {
     std::vector<Octet> inverse, diagonal, fluence, residual, direction, image;
 };
@@ -65,8 +65,8 @@ void turn(float keep, Octets some, Iteration& it) {
     }
 }
 
-// What leaves a cell whose fluence is the direction, less what comes from its neighbours. Returns its product with the
-// direction.
+// Applies the equations to the direction: net light that leaves each cell, were that its fluence. Returns the product of
+// both.
 double set_image(const DiffusionCells& cells, Octets some, Iteration& it) {
     Quad product = number(0);
     for (const std::int32_t one : some) {
@@ -97,7 +97,7 @@ double step(float length, Octets some, Iteration& it) {
     return sum_of(product);
 }
 
-// What lies beyond the inner and the outer faces on an axis: the inner face of an upper cell is its lower one.
+// Return the fluence beyond the inner and the outer faces on an axis: the inner face of an upper cell is its lower one.
 template <int kAxis>
 Cells beyond_inner(const FluenceOutside& outside) {
     return halves<kAxis>(same(outside[2 * kAxis]), same(outside[2 * kAxis + 1]));
@@ -235,7 +235,7 @@ void add_light_of_faces(const DiffusionCells& cells, const std::vector<Octet>& f
         const auto leaving_of = [&](std::size_t face) {
             return [&leaving, face](std::size_t n) { return leaving.empty() ? same(0) : load(leaving[n][face]); };
         };
-        // What arrives at the neighbour's face comes from where the cell itself looks away from.
+        // Take the light that arrives at the neighbour's face from the side opposite to it.
         if (any_positive(inner))
             add(inner, exchanged<kAxis>(fluence_of(octet)), {inner_of(0), inner_of(1), inner_of(2)},
                 beyond_outer<kAxis>(outside), exchanged<kAxis>(leaving_of(2 * kAxis)(octet)));
@@ -272,7 +272,7 @@ void collect_light(const DiffusionCells& cells, const std::vector<Octet>& fluenc
 
 constexpr double kSmallResidual = 1e-3;  // relative, which ends the iterations
 constexpr int kMostRounds = 200;
-// Of the solution in two levels: of its end, of what wide cells add in a turn, and steps on the fine ones in a turn.
+// End the solution in two levels, and in each of its turns that on wide cells and the steps on fine ones.
 constexpr double kSmallResidualOfTwo = 5e-3, kSmallResidualOfWide = 0.1;
 constexpr int kRoundsOfTurn = 4;
 constexpr double kNoLight = 1e-24;  // square of a fluence that no byte of a node shows

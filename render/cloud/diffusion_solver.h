@@ -39,7 +39,8 @@ struct SharedLight {
 SharedLight share_light(const DiffusionCells& cells, const std::vector<StartingLight>& starting);
 
 // Returns the fluence in all cells. `source`: the light that each of them scatters first or gets from outside; the element
-// for no octet may be left out. `albedo`: of single scattering. Results depend neither on the number of threads nor on the instruction set.
+// for no octet may be left out. `albedo`: of single scattering. Results depend neither on the number of threads nor on the
+// instruction set.
 std::vector<Octet> solve(const DiffusionCells& cells, const std::vector<Octet>& source, double albedo);
 
 // Returns the same for `fine` cells, which are halved(wide), to a residual of 0.005: `wide` ones find quickly what differs

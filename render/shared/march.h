@@ -50,7 +50,7 @@ NEPHOS_CONST float kTapsEnd_m = 30.5f;
 // is right; near lit surfaces it misses light that was scattered a few times, which the scattering table has
 // (render/frame/scattering_table.h): forwards, and, in units of 1/4 (1 - g) ((1 - cos) / 2)^2, soon turned back.
 NEPHOS_CONST float kDiffuseBase = 1.0f, kDiffuseFlux = 3.0f, kForwardLight = 1.0f, kTurnedBack = 3.5f;
-// What broad scattering, broad_scattering(g) = 1, has more of these: chosen for slabs and against Cycles (docs/lighting.md).
+// Add to these where scattering is broad, broad_scattering(g) = 1: fitted to slabs and to Cycles (docs/lighting.md).
 NEPHOS_CONST float kBroadFlux = 0.3f, kBroadForwardLight = 0.6f, kBroadTurnedBack = -1.5f;
 // By how much diffuse light falls off with a depth that the lattice does not know: as 1 / (1 + kDiffuseDecay (1 - g)
 // depth), diffusion through a slab; and the most that a bump has more than the lattice.

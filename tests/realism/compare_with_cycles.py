@@ -38,11 +38,10 @@ CLOUDS = {
                "sun": (38, 270), "step_m": 3.0},
     "cumulus": {"scene": "scenes/cumulus.toml", "time_s": 900, "extinction_per_m": 0.15, "eye_m": (0, -3200, 250),
                 "target_m": (0, 1500, 1150), "sun": (38, 270), "step_m": 6.0},
-    "cumulus-voxels": {"scene": "scenes/cumulus.toml", "time_s": 900, "extinction_per_m": 0.15, "eye_m": (0, -3200, 250),
-                       "target_m": (0, 1500, 1150), "sun": (38, 270), "step_m": 20.0, "refine": 1},
     "congestus": {"scene": "scenes/genera/Cb.toml", "time_s": 1500, "extinction_per_m": 0.02,
                   "eye_m": (-4000, -30000, 1500), "target_m": (0, 0, 6000), "sun": (30, 250), "step_m": 60.0},
 }
+CLOUDS["cumulus-voxels"] = CLOUDS["cumulus"] | {"step_m": 20.0, "refine": 1}  # in the voxels of its lattice
 GENERA = ("Ci", "Cc", "Cs", "Ac", "As", "Ns", "Sc", "St", "Cu", "Cb")
 
 
