@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include <tbb/parallel_for.h>
+
 #include "core/math.h"
 #include "core/vec.h"
 #include "render/cloud/cloud_preparation.h"
@@ -133,7 +135,7 @@ void use_ground_light(const GroundLight& light, const Vec3& eye_m, PictureFrame&
 }
 
 void store_part(const float* radiance, const float* depth, const PicturePart& part, Picture& picture) {
-    for (int y = 0; y < part.height; ++y) {
+    tbb::parallel_for(0, part.height, [&](int y) {
         std::size_t to = std::size_t(part.y + y) * std::size_t(picture.width) + std::size_t(part.x);
         std::size_t from = std::size_t(y) * std::size_t(part.width);
         for (int x = 0; x < part.width; ++x, ++to, ++from) {
@@ -145,7 +147,7 @@ void store_part(const float* radiance, const float* depth, const PicturePart& pa
                                       ? depth[from] / opacity
                                       : std::numeric_limits<float>::infinity();
         }
-    }
+    });
 }
 
 }  // namespace nephos

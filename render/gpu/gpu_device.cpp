@@ -226,6 +226,17 @@ bool has_unified_memory(const vk::PhysicalDeviceMemoryProperties& memory) {
                                [&](const vk::MemoryType& type) { return (type.propertyFlags & all) == all; });
 }
 
+// Keeps the drivers of graphics cards loaded from the first call on, as long as the process lives. Theirs are unloaded with
+// the last instance, and NVIDIA's finds no device any more, in no instance, when a process has loaded it about ten times.
+void keep_drivers_loaded() {
+    struct Loaded {
+        vk::raii::Context context = load_vulkan();
+        vk::raii::Instance instance = create_instance(context, nullptr);
+    };
+    static const auto* const loaded = new Loaded();  // never destroyed: drivers may have gone before
+    (void)loaded;
+}
+
 // Loads Vulkan and chooses a device, without opening it.
 GpuDevice find_device(const DeviceOptions& options) {
     GpuDevice gpu{load_vulkan()};
@@ -235,6 +246,7 @@ GpuDevice find_device(const DeviceOptions& options) {
         gpu.messenger = vk::raii::DebugUtilsMessengerEXT(gpu.instance, messenger_info(gpu.log.get()));
     gpu.physical = choose_device(physical_devices(gpu.instance), requested_device(options));
     gpu.properties = gpu.physical.getProperties();
+    if (gpu.properties.deviceType != vk::PhysicalDeviceType::eCpu) keep_drivers_loaded();
     return gpu;
 }
 

@@ -18,6 +18,7 @@
 #include "tests/bench/atmosphere_bench.h"
 #include "tests/bench/automaton_bench.h"
 #include "tests/bench/billboard_bench.h"
+#include "tests/bench/card_bench.h"
 #include "tests/bench/density_bench.h"
 #include "tests/bench/detail_bench.h"
 #include "tests/bench/export_bench.h"
@@ -82,6 +83,7 @@ int main(int argc, char** argv) {
         {"billboards", [] { return billboard_rows(); }},
         {"detail", [&] { return detail_rows(source); }},
         {"render", [&] { return render_rows(source, data); }},
+        {"card", [&] { return card_rows(source); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {
         fmt::print(

@@ -2,6 +2,7 @@
 #include "tests/bench/subject.h"
 
 #include "scenes/format/reader.h"
+#include "simulation/frame_detail.h"
 #include "simulation/simulation.h"
 
 namespace nephos::bench {
@@ -15,6 +16,18 @@ struct LastFrame : SimulationSink {
 };
 
 }  // namespace
+
+Subject subject_of(const Scene& scene, const FrameResult& frame, bool with_detail) {
+    const double radius = scene.density.metaball_radius_cells;
+    Subject subject{scene.name, metaballs(frame.density, radius), scene.density.extinction_per_m, scene.render, radius};
+    if (with_detail)
+        subject.detailed.push_back({.density = frame.density,
+                                    .moisture = frame.moisture,
+                                    .setting = detail_setting(scene, std::nullopt, frame.density, frame.time_s),
+                                    .first = 0,
+                                    .count = subject.balls.size()});
+    return subject;
+}
 
 Subject last_frame_of(const std::filesystem::path& file) {
     const Scene scene = read_scene(file);

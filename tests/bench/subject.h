@@ -10,6 +10,8 @@
 #include "density/metaballs.h"
 #include "render/cloud/splats.h"
 #include "render/options/options.h"
+#include "scenes/format/scene.h"
+#include "simulation/simulation.h"
 
 namespace nephos::bench {
 
@@ -20,7 +22,10 @@ struct Subject {
     double extinction_per_m = 0;
     RenderOptions options;
     double radius_cells = 2;
-    MetaballCloud cloud() const { return {balls, extinction_per_m, metaball_normalisation(radius_cells)}; }
+    std::vector<DetailedVoxels> detailed{};
+    MetaballCloud cloud() const {
+        return {balls, extinction_per_m, metaball_normalisation(radius_cells), detailed};
+    }
     // For a PNG or a film: nobody asks for depth and light.
     Splats pixels_only() const {
         Splats splats;
@@ -32,7 +37,10 @@ struct Subject {
     void change() { balls.front().density *= 0.999f; }
 };
 
-// The last frame of a scene, 640x480.
+// A frame of a scene of one lattice, as its run draws it; with its detail or without.
+Subject subject_of(const Scene& scene, const FrameResult& frame, bool with_detail);
+
+// The last frame of a scene without detail, 640x480.
 Subject last_frame_of(const std::filesystem::path& file);
 
 }  // namespace nephos::bench

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/bench/card_bench.h"
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+
+#include "core/error.h"
+#include "scenes/format/reader.h"
+#include "simulation/frame_painter.h"
+#include "simulation/simulation.h"
+#include "tests/bench/stage_table.h"
+#include "tests/bench/subject.h"
+
+namespace nephos::bench {
+namespace {
+
+constexpr int kFirst = 40, kLast = 47;  // frames of cumulus.toml: grown clouds
+constexpr std::array kSizes{std::pair{640, 480}, std::pair{1280, 720}, std::pair{1920, 1080}};
+
+// The camera 300 m from a cloud, as in tests/realism/cloud_bars.py.
+constexpr Vec3 kNearEye{-1200, 1600, 1350}, kNearTarget{-1200, 2600, 1380};
+
+std::optional<Renderer> renderer_of(Splatting splatting) {
+    try {
+        DeviceOptions options;
+        options.splatting = splatting;
+        return std::optional<Renderer>(std::in_place, options);
+    } catch (const Error& error) {
+        if (error.code() != ErrorCode::gpu) throw;
+        return std::nullopt;
+    }
+}
+
+// Milliseconds a picture, one drawn while the next is begun. Each has another camera, and its cloud is another where
+// `changes`.
+double picture_ms(Renderer& renderer, const Subject& subject, bool changes) {
+    const int pictures = renderer.backend_name() == "cpu" ? 8 : 32;  // of a round
+    std::vector<double> rounds;
+    // Two frames are in flight, and a cloud must not change until its frame is finished.
+    std::array<Subject, 2> subjects{subject, subject};
+    for (int round = -1; round < 3; ++round) {
+        const double ms = time_ms([&] {
+            std::optional<PendingPicture> before;
+            for (int i = 0; i < pictures; ++i) {
+                Subject& now = subjects[std::size_t(i) % 2];
+                if (changes) now.balls.front().density *= 0.99f - 0.01f * float(i % 2);
+                now.options.camera.position_m.z += 0.01;
+                PendingPicture next = renderer.begin(now.pixels_only(), now.options);
+                if (before) renderer.finish(std::move(*before));
+                before.emplace(std::move(next));
+            }
+            renderer.finish(std::move(*before));
+        });
+        if (round >= 0) rounds.push_back(ms / pictures);
+    }
+    return median(rounds);
+}
+
+struct Kept : SimulationSink {
+    std::vector<FrameResult> frames;
+    void step(const StepResult&) override {}
+    void frame(const FrameResult& result) override { frames.push_back(result); }
+};
+
+std::vector<FrameResult> frames_of(const Scene& scene) {
+    Kept kept;
+    Simulation simulation(scene, range_of_frames(scene, kFirst, kLast), {});
+    while (!simulation.finished()) simulation.advance(kept);
+    return std::move(kept.frames);
+}
+
+// Density, light and view of clouds that are new in every frame, as a run draws them.
+double film_ms(const Scene& scene, Splatting splatting, std::span<const FrameResult> frames) {
+    DeviceOptions device;
+    device.splatting = splatting;
+    FramePainter painter(scene, device);
+    std::vector<double> rounds;
+    for (int round = -1; round < 3; ++round) {
+        const double ms = time_ms([&] {
+            std::optional<PendingFrame> before;
+            for (const FrameResult& frame : frames) {
+                PendingFrame next = painter.begin(frame);
+                if (before) painter.finish(std::move(*before));
+                before.emplace(std::move(next));
+            }
+            painter.finish(std::move(*before));
+        });
+        if (round >= 0) rounds.push_back(ms / double(frames.size()));
+    }
+    return median(rounds);
+}
+
+BenchRow row(const std::string& what, const std::pair<int, int>& size, double ms, double other_ms,
+             const std::string& target, const std::string& device) {
+    return {fmt::format("cumulus.toml {}, {}x{}: {} against the processor", what, size.first, size.second, device), ms,
+            other_ms, target, fmt::format("{:.0f} frames/s", 1000 / ms)};
+}
+
+}  // namespace
+
+std::vector<BenchRow> card_rows(const std::filesystem::path& source) {
+    std::optional<Renderer> card = renderer_of(Splatting::vulkan);
+    if (!card) return {};
+    Renderer processor({.device = {}, .splatting = Splatting::cpu});
+    const std::filesystem::path file = source / "scenes/cumulus.toml";
+    const Scene scene = read_scene(file);
+    const std::vector<FrameResult> frames = frames_of(scene);
+    const std::string device = card->device_name();
+    Subject smooth = subject_of(scene, frames.front(), false), detailed = subject_of(scene, frames.front(), true);
+    std::vector<BenchRow> rows;
+    for (const auto& size : kSizes) {
+        const auto add = [&](const std::string& what, Subject& subject, bool changes, const std::string& target) {
+            subject.options.camera.width = size.first;
+            subject.options.camera.height = size.second;
+            const double ours = picture_ms(*card, subject, changes), other = picture_ms(processor, subject, changes);
+            rows.push_back(row(what, size, ours, other, target, device));
+            print_stages(fmt::format("{} on {}", rows.back().work, device), *card, 9, [&] {
+                subject.options.camera.position_m.z += 0.01;
+                if (changes) subject.change();
+                card->draw_splats(subject.pixels_only(), subject.options);
+            });
+        };
+        const std::string target = size.first == 1920 ? ">= 500 frames/s" : "";
+        add("without detail", smooth, false, target);
+        add("without detail, its light new in each", smooth, true, "");
+        add("with detail", detailed, false, "");
+        Subject near = detailed;
+        near.options.camera.position_m = kNearEye;
+        near.options.camera.target_m = kNearTarget;
+        add("with detail, 300 m from a cloud", near, false, "");
+        for (const bool detail : {false, true}) {
+            const std::vector<std::string> overrides{fmt::format("camera.width={}", size.first),
+                                                     fmt::format("camera.height={}", size.second),
+                                                     fmt::format("detail.enabled={}", detail)};
+            const Scene film = read_scene(file, overrides);
+            rows.push_back(row(detail ? "with detail, a new cloud in each" : "without detail, a new cloud in each", size,
+                               film_ms(film, Splatting::vulkan, frames), film_ms(film, Splatting::cpu, frames), "",
+                               device));
+        }
+    }
+    return rows;
+}
+
+}  // namespace nephos::bench
