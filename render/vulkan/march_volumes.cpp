@@ -57,27 +57,12 @@ Places for_each_volume(std::span<const CloudVolume> volumes, const What& what) {
     return at;
 }
 
-// Replaces a buffer by one with these words, which the device reads fast.
-void replace(const GpuDevice& gpu, GpuBuffer& buffer, std::span<const std::uint32_t> words) {
-    const std::span<const std::byte> bytes = std::as_bytes(words);
-    if (bytes.size() > gpu.properties.limits.maxStorageBufferRange)
-        throw Error(ErrorCode::usage, "this Vulkan device has no room for clouds with detail of " +
-                                          std::to_string(bytes.size()) + " bytes, but for at most " +
-                                          std::to_string(gpu.properties.limits.maxStorageBufferRange) +
-                                          ": choose the back-end cpu");
-    make_storage(gpu, buffer, std::max<std::size_t>(bytes.size(), 4));
-    upload_staged(gpu, buffer, bytes);
-}
-
-}  // namespace
-
-std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes) {
-    std::vector<std::uint32_t> words(for_each_volume(volumes, [](const auto&, const auto&) {}).cells_end);
+// Words of all volumes that hold cloud, one volume after the other: table, cells and nodes of their fields. A node's
+// word has its t and growth, and those of the next along x: what a look-up interpolates.
+void write_cells(std::span<const CloudVolume> volumes, std::span<std::uint32_t> words) {
     for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
         const CoverageField& field = volume.field;
         std::memcpy(&words[at.table], field.table().data(), 4 * field.table().size());
-        const auto& bands = field.erosion().bands;
-        if (!bands.empty()) std::memcpy(&words[at.bands], bands.data(), sizeof bands[0] * bands.size());
         std::memcpy(&words[at.cells], field.cells().data(), 4 * shader::kCellWords * field.places().size());
         tbb::parallel_for(std::size_t{0}, field.places().size(), [&](std::size_t brick) {
             const std::uint8_t* const from = &field.nodes()[brick * CoverageField::kBrickBytes];
@@ -86,29 +71,38 @@ std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes) {
                 to[i] = from[2 * i] | std::uint32_t(from[2 * i + 1]) << 8 |
                         std::uint32_t(from[2 * i + 2]) << 16 | std::uint32_t(from[2 * i + 3]) << 24;
         });
+        const auto& bands = field.erosion().bands;
+        if (!bands.empty()) std::memcpy(&words[at.bands], bands.data(), sizeof bands[0] * bands.size());
     });
-    return words;
 }
 
-std::vector<std::uint32_t> march_light(const LitCloud& cloud) {
-    std::vector<std::uint32_t> words(for_each_volume(cloud.volumes, [](const auto&, const auto&) {}).light_end);
-    for_each_volume(cloud.volumes, [&](const CloudVolume& volume, const Places& at) {
-        const std::size_t count = volume.field.places().size() * kLightNodesOfBrick;
-        for (std::size_t i = 0; i < count; ++i) {
-            const auto pair = [i](const std::vector<std::uint16_t>& of) {
-                return std::uint32_t(of[i]) | std::uint32_t(of[i + 1]) << 16;
-            };
-            words[at.light + i] = pair(volume.sun_depths);
-            words[at.light + count + i] = pair(volume.surroundings);
-            if (volume.diffuse.upwards.empty()) continue;
-            words[at.light + 2 * count + i] = pair(volume.diffuse.upwards);
-            words[at.light + 3 * count + i] = pair(volume.diffuse.sideways);
-        }
+// Words of the corners of cells, with what the next along x has: sun depths, then surroundings, of each volume; then those
+// of the light on the ground.
+void write_light(const LitCloud& cloud, std::span<std::uint32_t> words) {
+    const Places end = for_each_volume(cloud.volumes, [&](const CloudVolume& volume, const Places& at) {
+        const std::size_t bricks = volume.field.places().size(), plane = bricks * kLightNodesOfBrick;
+        const auto pairs = [&](const std::vector<std::uint16_t>& of, std::size_t brick, std::size_t nth) {
+            const std::size_t first = brick * kLightNodesOfBrick;
+            for (std::size_t i = first; i < first + kLightNodesOfBrick; ++i)
+                words[at.light + nth * plane + i] =
+                    of.empty() ? 0 : std::uint32_t(of[i]) | std::uint32_t(of[i + 1]) << 16;
+        };
+        tbb::parallel_for(std::size_t{0}, bricks, [&](std::size_t brick) {
+            pairs(volume.sun_depths, brick, 0);
+            pairs(volume.surroundings, brick, 1);
+            pairs(volume.diffuse.upwards, brick, 2);
+            pairs(volume.diffuse.sideways, brick, 3);
+        });
         std::ranges::copy(volume.shade, words.begin() + std::ptrdiff_t(at.shade));
     });
-    words.insert(words.end(), cloud.ground_light.words.begin(), cloud.ground_light.words.end());
-    return words;
+    std::ranges::copy(cloud.ground_light.words, words.begin() + std::ptrdiff_t(end.light_end));
 }
+
+Places all_places(std::span<const CloudVolume> volumes) {
+    return for_each_volume(volumes, [](const CloudVolume&, const Places&) {});
+}
+
+}  // namespace
 
 shader::March march_constants(const LitCloud& cloud, const CameraFrame& camera, double pixels_per_unit,
                               const CloudLight& light, float bend) {
@@ -183,24 +177,51 @@ shader::March march_constants(const LitCloud& cloud, const CameraFrame& camera, 
 }
 
 MarchVolumes::MarchVolumes(const GpuDevice& gpu) {
-    std::vector<std::uint32_t> words = detail_noise().large;
-    words.insert(words.end(), detail_noise().small.begin(), detail_noise().small.end());
-    replace(gpu, noise_, words);
+    const auto &large = detail_noise().large, &small = detail_noise().small;
+    upload(gpu, noise_, large.size() + small.size(), [&](std::span<std::uint32_t> words) {
+        std::ranges::copy(small, std::ranges::copy(large, words.begin()).out);
+    });
 }
 
 void MarchVolumes::reserve(const GpuDevice& gpu, std::size_t pixels) {
     make_storage(gpu, states_, 4 * sizeof(float) * pixels);
 }
 
+void MarchVolumes::upload(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t count,
+                          const std::function<void(std::span<std::uint32_t> words)>& write_words) {
+    const std::size_t bytes = std::max<std::size_t>(count, 1) * sizeof(std::uint32_t),
+                      most = gpu.properties.limits.maxStorageBufferRange;
+    if (bytes > most)
+        throw Error(ErrorCode::usage, "this Vulkan device has no room for clouds with detail of " + std::to_string(bytes) +
+                                          " bytes, but for at most " + std::to_string(most) +
+                                          ": choose the back-end cpu");
+    // Clouds that grow have room in them for a while: a card takes longer to hand out memory than to fill it.
+    const std::size_t with_room = std::min(bytes + bytes / 4, most);
+    if (buffer.bytes < bytes) make_storage(gpu, buffer, with_room);
+    if (staging_.bytes < bytes) {
+        staging_ = {};  // the old one goes before the new one comes
+        staging_ = create_buffer(gpu, with_room, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    }
+    write_words({reinterpret_cast<std::uint32_t*>(staging_.mapped), count});
+    gpu.uploaded_bytes += bytes;
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        full_barrier(commands);
+        commands.copyBuffer(*staging_.buffer, *buffer.buffer, vk::BufferCopy(0, 0, bytes));
+        full_barrier(commands);
+    });
+}
+
 void MarchVolumes::use(const GpuDevice& gpu, const LitCloud& cloud) {
+    const Places all = all_places(cloud.volumes);
     if (cells_version_ != cloud.volumes_version) {
         cells_version_ = 0;  // until it is there
-        replace(gpu, cells_, march_cells(cloud.volumes));
+        upload(gpu, cells_, all.cells_end, [&](std::span<std::uint32_t> words) { write_cells(cloud.volumes, words); });
         cells_version_ = cloud.volumes_version;
     }
     if (light_version_ != cloud.volumes_light) {
         light_version_ = 0;
-        replace(gpu, light_, march_light(cloud));
+        upload(gpu, light_, all.light_end + cloud.ground_light.words.size(),
+               [&](std::span<std::uint32_t> words) { write_light(cloud, words); });
         light_version_ = cloud.volumes_light;
     }
 }

@@ -4,9 +4,10 @@
 // Clouds with detail (LitCloud::volumes) in device memory, for shaders that march through them
 // (render/shading/march.glsl). Private to the module.
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
-#include <vector>
 
 #include "render/backend/lit_cloud.h"
 #include "render/gpu/descriptor_sets.h"
@@ -15,12 +16,6 @@
 
 namespace nephos {
 
-// Words of all volumes that hold cloud, one volume after the other: table, cells and nodes of their fields. A node's
-// word has its t and growth, and those of the next along x: what a look-up interpolates.
-std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes);
-// Words of the corners of cells, with what the next along x has: sun depths, then surroundings, of each volume; then those
-// of the light on the ground.
-std::vector<std::uint32_t> march_light(const LitCloud& cloud);
 // What shaders know of these volumes and words. Throws Error(usage) when there are more than shader::kMostVolumes.
 shader::March march_constants(const LitCloud& cloud, const CameraFrame& camera,
                               double pixels_per_unit, const CloudLight& light, float bend);
@@ -48,7 +43,12 @@ class MarchVolumes {
     }
 
   private:
+    // Replaces what a buffer holds by `count` words, which `write_words` writes in any order and does not read.
+    void upload(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t count,
+                const std::function<void(std::span<std::uint32_t> words)>& write_words);
+
     GpuBuffer cells_, light_, noise_;
+    GpuBuffer staging_;  // from which they are copied
     GpuBuffer states_;  // of the rays, between two dispatches
     Version cells_version_ = 0, light_version_ = 0;
 };

@@ -26,12 +26,14 @@ class BillboardWays : public test::AllBackends {
         const Picture fast = renderer_.draw_splats(splats, options);
         const Picture slow = reference_.draw_splats(splats, options);
         const float brightest = std::max(1.0f, *std::ranges::max_element(slow.beauty));
-        EXPECT_LE(test::largest_difference(fast.beauty, slow.beauty), brightest / 255.0f);
-        EXPECT_LE(test::largest_difference(fast.transmittance, slow.transmittance), 1.0f / 255.0f);
+        // Cards filter textures with 8 bits of a texel.
+        const float levels = test::draws_on_card(reference_) ? 1.25f : 1.0f;
+        EXPECT_LE(test::largest_difference(fast.beauty, slow.beauty), levels * brightest / 255.0f);
+        EXPECT_LE(test::largest_difference(fast.transmittance, slow.transmittance), levels / 255.0f);
         const std::size_t depths = test::expect_same_depths(fast, slow, 0.1f, 0.01f);
         EXPECT_GT(depths, slow.pixels() / 10);
         splats.light = splats.depth = false;
-        EXPECT_EQ(renderer_.draw_splats(splats, options).beauty, fast.beauty);
+        test::expect_same_pixels(renderer_, renderer_.draw_splats(splats, options).beauty, fast.beauty);
     }
 
     Renderer reference_{test::validated(Splatting::blended)};

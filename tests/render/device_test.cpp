@@ -41,6 +41,17 @@ TEST(Device, ValidationSeesASeededHazard) {
     EXPECT_NE(messages.front().find("SYNC-HAZARD-WRITE-AFTER-WRITE"), std::string::npos) << messages.front();
 }
 
+// The validation layer's GPU-assisted checks are switched on by its own variable.
+TEST(Device, GpuAssistedValidationSeesASeededOverrun) {
+    ::setenv("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_GPU_ASSISTED_EXT", 1);
+    Renderer renderer({.validation = true, .splatting = Splatting::vulkan});
+    ::unsetenv("VK_LAYER_ENABLES");
+    RendererTestAccess::provoke_overrun(renderer);
+    const std::vector<std::string> messages = renderer.validation_messages();
+    ASSERT_FALSE(messages.empty());
+    EXPECT_NE(messages.front().find("out of bounds"), std::string::npos) << messages.front();
+}
+
 TEST(Device, IsFoundByNameAndNumber) {
     const std::vector<std::string> names = device_names();
     ASSERT_FALSE(names.empty());

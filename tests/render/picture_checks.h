@@ -72,6 +72,17 @@ inline float largest_difference(const std::vector<float>& a, const std::vector<f
     return largest;
 }
 
+inline bool draws_on_card(const Renderer& renderer) {
+    return renderer.backend_name() != "cpu" && !renderer.device_name().starts_with("llvmpipe");
+}
+
+// Expects the pixels of two pipelines of one device to be the same. A card's driver compiles the arithmetic of each to
+// roundings of its own: there they differ in the last bits.
+inline void expect_same_pixels(const Renderer& renderer, const std::vector<float>& a, const std::vector<float>& b) {
+    const float most = draws_on_card(renderer) ? 1e-5f * std::max(1.0f, *std::ranges::max_element(b)) : 0.0f;
+    EXPECT_LE(largest_difference(a, b), most);
+}
+
 // Expects equal depths wherever both pictures have an opacity above `least_opacity`, within a relative `tolerance`
 // divided by the opacity. Returns the number of pixels compared.
 inline std::size_t expect_same_depths(const Picture& picture, const Picture& reference, float least_opacity,

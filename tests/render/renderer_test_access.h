@@ -31,6 +31,8 @@ struct RendererTestAccess {
     static void divide_memory(Renderer& renderer);
     // Submits a deliberate write-after-write hazard, which the synchronization validation must report.
     static void provoke_hazard(Renderer& renderer);
+    // Has a shader read beyond the end of a buffer.
+    static void provoke_overrun(Renderer& renderer);
 
     // Indices of keys, sorted by the passes of device_sort.h over so many bits of them.
     static std::vector<std::uint32_t> sorted(Renderer& renderer, std::span<const std::uint32_t> keys,

@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,12 +19,14 @@ namespace {
 class LostPictures : public testing::Test {
   protected:
     void SetUp() override {
+        if (const char* const path = std::getenv("VK_LAYER_PATH")) layer_path_ = path;
         ::setenv("VK_LAYER_PATH", NEPHOS_LAYERS, 1);
         ::setenv("VK_INSTANCE_LAYERS", "VK_LAYER_NEPHOS_lost_device", 1);
         splats_.metaballs = {balls_, 0.002, 0.7};
     }
     void TearDown() override {
         for (const char* name : {"VK_LAYER_PATH", "VK_INSTANCE_LAYERS", kWaits, kMemory}) ::unsetenv(name);
+        if (layer_path_) ::setenv("VK_LAYER_PATH", layer_path_->c_str(), 1);
     }
 
     // A lattice that fills the picture from within, and the same from far away.
@@ -55,6 +58,7 @@ class LostPictures : public testing::Test {
     }
 
     static constexpr const char *kWaits = "NEPHOS_LOSE_WAIT_AFTER", *kMemory = "NEPHOS_REFUSE_MEMORY_AFTER";
+    std::optional<std::string> layer_path_;  // as it was before
     const std::vector<Metaball> balls_ = lattice();
     Splats splats_;
     Renderer renderer() const { return Renderer({.splatting = Splatting::vulkan}); }
