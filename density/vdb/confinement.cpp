@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <initializer_list>
 #include <limits>
 #include <memory>
 #include <sstream>
@@ -60,13 +61,17 @@ void set_limit(__rlimit_resource resource, std::size_t value) {
     if (::setrlimit(resource, &limit) != 0) fail("setrlimit", errno);
 }
 
-// Closes what is not kept, and gives the standard streams that are not an end in nothing.
-void close_others(std::vector<int> kept) {
+// Has the standard streams that are not kept end in nothing.
+void silence(std::initializer_list<int> streams, std::span<const int> kept) {
     const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
-    for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    for (const int fd : streams) {
         if (std::ranges::find(kept, fd) != kept.end()) continue;
         if (nowhere < 0 || ::dup2(nowhere, fd) < 0) ::close(fd);
     }
+}
+
+// Closes what is not kept, but for the standard streams.
+void close_others(std::vector<int> kept) {
     std::ranges::sort(kept);
     unsigned first = STDERR_FILENO + 1;
     const auto close_until = [&first](unsigned last) {
@@ -156,7 +161,9 @@ void confine(pid_t parent, std::span<const int> kept, std::size_t memory_bytes, 
     for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGPIPE}) ::signal(signal, SIG_DFL);
     set_limit(RLIMIT_CORE, 0);
     set_limit(RLIMIT_CPU, std::size_t(seconds) + 1);
+    silence({STDIN_FILENO, STDOUT_FILENO}, kept);
     if (NEPHOS_SANITIZED) return;
+    silence({STDERR_FILENO}, kept);
     close_others({kept.begin(), kept.end()});
     set_limit(RLIMIT_AS, sum_or_most(address_space(), memory_bytes));
     stop_sharing();
