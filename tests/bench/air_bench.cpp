@@ -2,6 +2,7 @@
 #include "tests/bench/air_bench.h"
 
 #include <cstring>
+#include <string>
 
 #include <fmt/core.h>
 #include <tbb/global_control.h>
@@ -15,8 +16,8 @@ namespace {
 
 constexpr int kRounds = 15;
 
-const char* name_of(Splatting splatting) {
-    return splatting == Splatting::cpu ? "processor" : "compute tiles on lavapipe";
+std::string name_of(const Renderer& renderer) {
+    return renderer.backend_name() == "cpu" ? "processor" : "compute tiles on " + renderer.device_name();
 }
 
 // What shells add to a picture whose light is known, against copies of a float frame buffer.
@@ -43,7 +44,7 @@ BenchRow shells_row(const Subject& subject, Splatting splatting) {
         copied.push_back(copies);
     }
     return {fmt::format("{} shells of light shafts, 640x480, {}, against {} copies of a float frame buffer",
-                        shells, name_of(splatting), shells),
+                        shells, name_of(renderer), shells),
             median(added), median(copied), "<= 3x", "what a picture with them takes longer, 2 cores"};
 }
 
@@ -78,7 +79,7 @@ BenchRow atmosphere_row(const std::filesystem::path& file, Splatting splatting) 
     for (int round = 0; round < kRounds; ++round) times.push_back(time_ms(draw));
     return {fmt::format(
                 "whole atmosphere (physical sky, 40 shells of shafts and fog) without clouds, 640x480, {}",
-                name_of(splatting)),
+                name_of(renderer)),
             median(times), 0, "<= 50 ms", "2 cores"};
 }
 

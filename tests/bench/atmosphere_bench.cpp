@@ -49,7 +49,7 @@ std::vector<BenchRow> atmosphere_rows() {
         {"tables that depend on the air alone", median(made), 0, "", "once for each haze, ozone and ground"},
         {"whole sky and ground without clouds, 640x480, processor", picture_ms(Splatting::cpu), 0, "<= 50 ms",
          ""},
-        {"the same in compute shaders", picture_ms(Splatting::vulkan), 0, "<= 50 ms on lavapipe", ""}};
+        {"the same in compute shaders", picture_ms(Splatting::vulkan), 0, "<= 50 ms", ""}};
 }
 
 }  // namespace nephos::bench

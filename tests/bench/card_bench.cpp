@@ -14,7 +14,6 @@
 #include "scenes/format/reader.h"
 #include "simulation/frame_painter.h"
 #include "simulation/simulation.h"
-#include "tests/bench/stage_table.h"
 #include "tests/bench/subject.h"
 
 namespace nephos::bench {
@@ -37,9 +36,15 @@ std::optional<Renderer> renderer_of(Splatting splatting) {
     }
 }
 
+enum class Flight { level, climbing };  // another height of the eye has another sky
+
+void fly(Camera& camera, Flight flight) {
+    (flight == Flight::level ? camera.position_m.x : camera.position_m.z) += 0.1;
+}
+
 // Milliseconds a picture, one drawn while the next is begun. Each has another camera, and its cloud is another where
 // `changes`.
-double picture_ms(Renderer& renderer, const Subject& subject, bool changes) {
+double picture_ms(Renderer& renderer, const Subject& subject, bool changes, Flight flight = Flight::level) {
     const int pictures = renderer.backend_name() == "cpu" ? 8 : 32;  // of a round
     std::vector<double> rounds;
     // Two frames are in flight, and a cloud must not change until its frame is finished.
@@ -50,7 +55,7 @@ double picture_ms(Renderer& renderer, const Subject& subject, bool changes) {
             for (int i = 0; i < pictures; ++i) {
                 Subject& now = subjects[std::size_t(i) % 2];
                 if (changes) now.balls.front().density *= 0.99f - 0.01f * float(i % 2);
-                now.options.camera.position_m.z += 0.01;
+                fly(now.options.camera, flight);
                 PendingPicture next = renderer.begin(now.pixels_only(), now.options);
                 if (before) renderer.finish(std::move(*before));
                 before.emplace(std::move(next));
@@ -112,28 +117,27 @@ std::vector<BenchRow> card_rows(const std::filesystem::path& source) {
     const Scene scene = read_scene(file);
     const std::vector<FrameResult> frames = frames_of(scene);
     const std::string device = card->device_name();
-    Subject smooth = subject_of(scene, frames.front(), false), detailed = subject_of(scene, frames.front(), true);
+    const Subject smooth = subject_of(scene, frames.front(), false), detailed = subject_of(scene, frames.front(), true);
     std::vector<BenchRow> rows;
     for (const auto& size : kSizes) {
-        const auto add = [&](const std::string& what, Subject& subject, bool changes, const std::string& target) {
+        const auto add = [&](const std::string& what, Subject subject, bool changes, const std::string& target = "",
+                             Flight flight = Flight::level) {
             subject.options.camera.width = size.first;
             subject.options.camera.height = size.second;
-            const double ours = picture_ms(*card, subject, changes), other = picture_ms(processor, subject, changes);
-            rows.push_back(row(what, size, ours, other, target, device));
-            print_stages(fmt::format("{} on {}", rows.back().work, device), *card, 9, [&] {
-                subject.options.camera.position_m.z += 0.01;
-                if (changes) subject.change();
-                card->draw_splats(subject.pixels_only(), subject.options);
-            });
+            rows.push_back(row(what, size, picture_ms(*card, subject, changes, flight),
+                               picture_ms(processor, subject, changes, flight), target, device));
         };
-        const std::string target = size.first == 1920 ? ">= 500 frames/s" : "";
-        add("without detail", smooth, false, target);
-        add("without detail, its light new in each", smooth, true, "");
-        add("with detail", detailed, false, "");
-        Subject near = detailed;
+        Subject all = smooth, near = detailed;
+        all.options.level_of_detail.pixels = 0;
         near.options.camera.position_m = kNearEye;
         near.options.camera.target_m = kNearTarget;
-        add("with detail, 300 m from a cloud", near, false, "");
+        add("without detail, no metaballs merged", all, false, size.first == 1920 ? ">= 500 frames/s" : "");
+        add("without detail", smooth, false);
+        add("without detail, climbing", smooth, false, "", Flight::climbing);
+        add("without detail, its light new in each", smooth, true);
+        add("with detail", detailed, false);
+        add("with detail, climbing", detailed, false, "", Flight::climbing);
+        add("with detail, 300 m from a cloud", near, false);
         for (const bool detail : {false, true}) {
             const std::vector<std::string> overrides{fmt::format("camera.width={}", size.first),
                                                      fmt::format("camera.height={}", size.second),

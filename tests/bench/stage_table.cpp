@@ -61,7 +61,7 @@ void print_stages(const std::string& what, const Renderer& renderer, int rounds,
     }
     const double copied = copied_bytes_per_ns();
     fmt::print(
-        "Stages of {}; memory copies {:.1f} GB/s\n\n"
+        "Stages of {}, 640x480; memory copies {:.1f} GB/s\n\n"
         "| stage | wall, ms | processor, ms | MB moved | against copying them | pairs, millions | ns a pair "
         "|\n|---|---|---|---|---|---|---|\n",
         what, copied);
