@@ -13,7 +13,6 @@
 #include "core/error.h"
 #include "scenes/format/reader.h"
 #include "simulation/frame_painter.h"
-#include "simulation/simulation.h"
 #include "tests/bench/subject.h"
 
 namespace nephos::bench {
@@ -67,19 +66,6 @@ double picture_ms(Renderer& renderer, const Subject& subject, bool changes, Flig
     return median(rounds);
 }
 
-struct Kept : SimulationSink {
-    std::vector<FrameResult> frames;
-    void step(const StepResult&) override {}
-    void frame(const FrameResult& result) override { frames.push_back(result); }
-};
-
-std::vector<FrameResult> frames_of(const Scene& scene) {
-    Kept kept;
-    Simulation simulation(scene, range_of_frames(scene, kFirst, kLast), {});
-    while (!simulation.finished()) simulation.advance(kept);
-    return std::move(kept.frames);
-}
-
 // Density, light and view of clouds that are new in every frame, as a run draws them.
 double film_ms(const Scene& scene, Splatting splatting, std::span<const FrameResult> frames) {
     DeviceOptions device;
@@ -115,7 +101,7 @@ std::vector<BenchRow> card_rows(const std::filesystem::path& source) {
     Renderer processor({.device = {}, .splatting = Splatting::cpu});
     const std::filesystem::path file = source / "scenes/cumulus.toml";
     const Scene scene = read_scene(file);
-    const std::vector<FrameResult> frames = frames_of(scene);
+    const std::vector<FrameResult> frames = frames_of(scene, kFirst, kLast);
     const std::string device = card->device_name();
     const Subject smooth = subject_of(scene, frames.front(), false), detailed = subject_of(scene, frames.front(), true);
     std::vector<BenchRow> rows;

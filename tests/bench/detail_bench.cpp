@@ -18,6 +18,7 @@
 #include "simulation/simulation.h"
 #include "simulation/stage.h"
 #include "tests/bench/stage_table.h"
+#include "tests/bench/subject.h"
 
 namespace nephos::bench {
 namespace {
@@ -28,19 +29,6 @@ constexpr int kFirst = 40, kLast = 63;  // frames of cumulus.toml: grown clouds
 const std::vector<std::string> kNear{"camera.position_m=[-1200, 1600, 1350]", "camera.target_m=[-1200, 2600, 1380]"};
 
 double processor_now_ms() { return 1000.0 * double(std::clock()) / CLOCKS_PER_SEC; }
-
-struct Kept : SimulationSink {
-    std::vector<FrameResult> frames;
-    void step(const StepResult&) override {}
-    void frame(const FrameResult& result) override { frames.push_back(result); }
-};
-
-std::vector<FrameResult> frames_of(const Scene& scene, int first, int last) {
-    Kept kept;
-    Simulation simulation(scene, range_of_frames(scene, first, last), {});
-    while (!simulation.finished()) simulation.advance(kept);
-    return std::move(kept.frames);
-}
 
 DetailedVoxels voxels_of(const Scene& scene, const FrameResult& frame) {
     DetailedVoxels voxels;

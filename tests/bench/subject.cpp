@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/bench/subject.h"
 
+#include <utility>
+
 #include "scenes/format/reader.h"
 #include "simulation/frame_detail.h"
 #include "simulation/simulation.h"
@@ -15,7 +17,20 @@ struct LastFrame : SimulationSink {
     void frame(const FrameResult& result) override { density = result.density; }
 };
 
+struct Kept : SimulationSink {
+    std::vector<FrameResult> frames;
+    void step(const StepResult&) override {}
+    void frame(const FrameResult& result) override { frames.push_back(result); }
+};
+
 }  // namespace
+
+std::vector<FrameResult> frames_of(const Scene& scene, int first, int last) {
+    Kept kept;
+    Simulation simulation(scene, range_of_frames(scene, first, last), {});
+    while (!simulation.finished()) simulation.advance(kept);
+    return std::move(kept.frames);
+}
 
 Subject subject_of(const Scene& scene, const FrameResult& frame, bool with_detail) {
     const double radius = scene.density.metaball_radius_cells;

@@ -37,6 +37,9 @@ struct Subject {
     void change() { balls.front().density *= 0.999f; }
 };
 
+// The frames of a scene from `first` to `last`, counted from 1.
+std::vector<FrameResult> frames_of(const Scene& scene, int first, int last);
+
 // A frame of a scene of one lattice, as its run draws it; with its detail or without.
 Subject subject_of(const Scene& scene, const FrameResult& frame, bool with_detail);
 
