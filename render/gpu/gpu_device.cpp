@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <optional>
 #include <span>
 
@@ -226,15 +227,29 @@ bool has_unified_memory(const vk::PhysicalDeviceMemoryProperties& memory) {
                                [&](const vk::MemoryType& type) { return (type.propertyFlags & all) == all; });
 }
 
-// Keeps the drivers of graphics cards loaded from the first call on, as long as the process lives. Theirs are unloaded with
-// the last instance, and NVIDIA's finds no device any more, in no instance, when a process has loaded it about ten times.
+// Keeps the drivers of graphics cards loaded from the first call on, as long as the process lives. They are unloaded with the
+// last instance, and NVIDIA's finds no device any more, in no instance, when a process has loaded it about ten times. Where it
+// fails, nothing is lost yet.
 void keep_drivers_loaded() {
     struct Loaded {
         vk::raii::Context context = load_vulkan();
         vk::raii::Instance instance = create_instance(context, nullptr);
     };
-    static const auto* const loaded = new Loaded();  // never destroyed: drivers may have gone before
-    (void)loaded;
+    try {
+        static const Loaded& loaded = *new Loaded;  // never destroyed: drivers may have gone before
+        static_cast<void>(loaded);
+    } catch (const std::exception&) {
+    }
+}
+
+// Returns the devices of all drivers.
+std::vector<vk::raii::PhysicalDevice> find_devices(const vk::raii::Instance& instance) {
+    std::vector<vk::raii::PhysicalDevice> devices = physical_devices(instance);
+    if (std::ranges::any_of(devices, [](const vk::raii::PhysicalDevice& each) {
+            return each.getProperties().deviceType != vk::PhysicalDeviceType::eCpu;
+        }))
+        keep_drivers_loaded();
+    return devices;
 }
 
 // Loads Vulkan and chooses a device, without opening it.
@@ -244,9 +259,8 @@ GpuDevice find_device(const DeviceOptions& options) {
     gpu.instance = create_instance(gpu.context, gpu.log.get());
     if (gpu.log != nullptr)
         gpu.messenger = vk::raii::DebugUtilsMessengerEXT(gpu.instance, messenger_info(gpu.log.get()));
-    gpu.physical = choose_device(physical_devices(gpu.instance), requested_device(options));
+    gpu.physical = choose_device(find_devices(gpu.instance), requested_device(options));
     gpu.properties = gpu.physical.getProperties();
-    if (gpu.properties.deviceType != vk::PhysicalDeviceType::eCpu) keep_drivers_loaded();
     return gpu;
 }
 
@@ -322,7 +336,7 @@ std::vector<std::string> device_names() {
         const vk::raii::Context context = load_vulkan();
         const vk::raii::Instance instance = create_instance(context, nullptr);
         std::vector<std::string> names;
-        for (const auto& physical : physical_devices(instance)) names.push_back(name_of(physical));
+        for (const auto& physical : find_devices(instance)) names.push_back(name_of(physical));
         return names;
     });
 }

@@ -187,7 +187,7 @@ void MarchVolumes::reserve(const GpuDevice& gpu, std::size_t pixels) {
     make_storage(gpu, states_, 4 * sizeof(float) * pixels);
 }
 
-void MarchVolumes::upload(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t count,
+void MarchVolumes::upload(const GpuDevice& gpu, Words& to, std::size_t count,
                           const std::function<void(std::span<std::uint32_t> words)>& write_words) {
     const std::size_t bytes = std::max<std::size_t>(count, 1) * sizeof(std::uint32_t),
                       most = gpu.properties.limits.maxStorageBufferRange;
@@ -195,20 +195,29 @@ void MarchVolumes::upload(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t c
         throw Error(ErrorCode::usage, "this Vulkan device has no room for clouds with detail of " + std::to_string(bytes) +
                                           " bytes, but for at most " + std::to_string(most) +
                                           ": choose the back-end cpu");
-    // Clouds that grow have room in them for a while: a card takes longer to hand out memory than to fill it.
-    const std::size_t with_room = std::min(bytes + bytes / 4, most);
-    if (buffer.bytes < bytes) make_storage(gpu, buffer, with_room);
-    if (staging_.bytes < bytes) {
+    // A card takes longer to hand out memory than to fill it: buffers stay until they are too small, or far too large.
+    const auto make_fit = [&](const GpuBuffer& buffer, const std::function<void(std::size_t)>& make) {
+        if (buffer.bytes >= bytes && buffer.bytes / 4 <= bytes) return;
+        try {
+            make(std::min(bytes + bytes / 8, most));
+        } catch (const vk::OutOfDeviceMemoryError&) {
+            make(bytes);
+        }
+    };
+    to.bytes = 0;
+    make_fit(to.buffer, [&](std::size_t size) { make_storage(gpu, to.buffer, size); });
+    make_fit(staging_, [&](std::size_t size) {
         staging_ = {};  // the old one goes before the new one comes
-        staging_ = create_buffer(gpu, with_room, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    }
+        staging_ = create_buffer(gpu, size, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    });
     write_words({reinterpret_cast<std::uint32_t*>(staging_.mapped), count});
     gpu.uploaded_bytes += bytes;
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         full_barrier(commands);
-        commands.copyBuffer(*staging_.buffer, *buffer.buffer, vk::BufferCopy(0, 0, bytes));
+        commands.copyBuffer(*staging_.buffer, *to.buffer.buffer, vk::BufferCopy(0, 0, bytes));
         full_barrier(commands);
     });
+    to.bytes = bytes;
 }
 
 void MarchVolumes::use(const GpuDevice& gpu, const LitCloud& cloud) {

@@ -39,15 +39,25 @@ class MarchVolumes {
 
     // Returns what shaders that march read and write; `constants`: a shader::March.
     Resources resources(const GpuBuffer& constants) const {
-        return {{18, constants}, {19, cells_}, {20, light_}, {21, noise_}, {22, states_}};
+        return {{18, constants}, cells_.as(19), light_.as(20), noise_.as(21), {22, states_}};
     }
 
   private:
-    // Replaces what a buffer holds by `count` words, which `write_words` writes in any order and does not read.
-    void upload(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t count,
+    // What is in a buffer, which may be larger.
+    struct Words {
+        GpuBuffer buffer;
+        std::size_t bytes = 0;
+        Resource as(std::uint32_t number) const {
+            Resource resource(number, buffer);
+            resource.bytes = bytes;
+            return resource;
+        }
+    };
+    // Replaces them by `count` words, which `write_words` writes in any order and does not read.
+    void upload(const GpuDevice& gpu, Words& to, std::size_t count,
                 const std::function<void(std::span<std::uint32_t> words)>& write_words);
 
-    GpuBuffer cells_, light_, noise_;
+    Words cells_, light_, noise_;
     GpuBuffer staging_;  // from which they are copied
     GpuBuffer states_;  // of the rays, between two dispatches
     Version cells_version_ = 0, light_version_ = 0;

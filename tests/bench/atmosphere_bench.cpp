@@ -29,13 +29,13 @@ double new_sun_ms(double first_deg) {
     return median(times);
 }
 
-double picture_ms(Splatting splatting) {
+BenchRow picture_row(Splatting splatting) {
     Renderer renderer({.splatting = splatting});
     renderer.draw({}, empty_sky(30));
     std::vector<double> times;
     for (int round = 0; round < kRounds; ++round)
         times.push_back(time_ms([&] { renderer.draw({}, empty_sky(30)); }));
-    return median(times);
+    return {"whole sky and ground without clouds, 640x480, " + renderer.device_name(), median(times), 0, "<= 50 ms", ""};
 }
 
 }  // namespace
@@ -47,9 +47,8 @@ std::vector<BenchRow> atmosphere_rows() {
         {"sky tables for a new sun by day, both neighbours, all cores", new_sun_ms(5), 0, "<= 20 ms", ""},
         {"the same in twilight", new_sun_ms(-14), 0, "<= 20 ms", ""},
         {"tables that depend on the air alone", median(made), 0, "", "once for each haze, ozone and ground"},
-        {"whole sky and ground without clouds, 640x480, processor", picture_ms(Splatting::cpu), 0, "<= 50 ms",
-         ""},
-        {"the same in compute shaders", picture_ms(Splatting::vulkan), 0, "<= 50 ms", ""}};
+        picture_row(Splatting::cpu),
+        picture_row(Splatting::vulkan)};
 }
 
 }  // namespace nephos::bench

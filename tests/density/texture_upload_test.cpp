@@ -87,6 +87,8 @@ class Device {
         queue_.waitIdle();
     }
 
+    bool is_software() const { return physical_.getProperties().deviceType == vk::PhysicalDeviceType::eCpu; }
+
     static vk::Extent3D extent_of(const VolumeLevel& level) {
         return {std::uint32_t(level.nx), std::uint32_t(level.ny), std::uint32_t(level.nz)};
     }
@@ -170,17 +172,17 @@ TEST(TextureUpload, ADeviceDecodesEveryLevelAsWeDo) {
     const TemporaryFolder folder;
     write_ktx2(folder.path() / "v.ktx2", encoded, "{}");
     Device device;
+    // Devices interpolate between the ends of a block with few bits; an H200 is more than 2 levels off in some voxels.
+    const float most = (device.is_software() ? 2.0f : 3.0f) / 255;
     std::size_t compared = 0;
     for (const VolumeLevel& level : read_ktx2(folder.path() / "v.ktx2").levels) {
         const Volume ours =
             decode(level.bytes.data(), level.bytes.size(), level.nx, level.ny, level.nz, VoxelType::bc4, 1);
         const std::vector<float> theirs = read_back(device, level);
         ASSERT_EQ(theirs.size(), ours.values.size());
-        for (std::size_t n = 0; n < theirs.size(); ++n) {
-            // Devices interpolate between the ends of a block with few bits: an H200 is off by up to 2.02 / 255.
-            ASSERT_NEAR(theirs[n], ours.values[n], 3.0f / 255) << level.nx << " voxels wide, voxel " << n;
-            ++compared;
-        }
+        for (std::size_t n = 0; n < theirs.size(); ++n)
+            ASSERT_NEAR(theirs[n], ours.values[n], most) << level.nx << " voxels wide, voxel " << n;
+        compared += theirs.size();
     }
     EXPECT_EQ(compared, std::size_t(24 * 16 * 12 + 12 * 8 * 6 + 6 * 4 * 3));
 }

@@ -116,11 +116,13 @@ void RendererTestAccess::provoke_hazard(Renderer& renderer) {
 // Sums up a block of numbers of which few are there.
 void RendererTestAccess::provoke_overrun(Renderer& renderer) {
     const std::vector<std::uint32_t> numbers(1000);
-    SortBench bench(device(renderer), numbers, 16);
-    bench.run([&](const OrderRecorder& recorder) {
-        shader::OrderStep step{};
-        step.table = shader::kSeenSplats;
-        recorder.run(OrderPass::scan_reduce, bench.resources(), step, 1);
+    with_gpu_errors("provoking an overrun", [&] {
+        SortBench bench(device(renderer), numbers, 16);
+        bench.run([&](const OrderRecorder& recorder) {
+            shader::OrderStep step{};
+            step.table = shader::kSeenSplats;
+            recorder.run(OrderPass::scan_reduce, bench.resources(), step, 1);
+        });
     });
 }
 

@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "render/image/tone_map.h"
 #include "tests/render/temporary_folder.h"
+#include "tests/scoped_variable.h"
 
 namespace nephos {
 namespace {
@@ -32,20 +33,6 @@ std::string output_of(const std::string& command) {
     while (pipe != nullptr && std::fgets(line, sizeof line, pipe.get()) != nullptr) text += line;
     return text;
 }
-
-// The environment's PATH for the time of a test.
-class PathOverride {
-  public:
-    explicit PathOverride(const std::string& value) : before_(std::getenv("PATH")) {
-        ::setenv("PATH", value.c_str(), 1);
-    }
-    PathOverride(const PathOverride&) = delete;
-    PathOverride& operator=(const PathOverride&) = delete;
-    ~PathOverride() { ::setenv("PATH", before_.c_str(), 1); }
-
-  private:
-    std::string before_;
-};
 
 void put_command(const std::filesystem::path& folder, const char* script) {
     const std::filesystem::path file = folder / "ffmpeg";
@@ -91,7 +78,7 @@ TEST(Video, RunsOnTheProcessorsThatItIsGiven) {
     EXPECT_EQ(encoded("one.mp4", 1), all);
     put_command(folder.path(),
                 "#!/bin/sh\nsleep 0.2\nnproc > \"${0%/*}/seen\"\ncat > /dev/null\necho frame=1\n");
-    const PathOverride path(folder.path().string() + ":/usr/bin:/bin");
+    const test::ScopedVariable path("PATH", folder.path().string() + ":/usr/bin:/bin");
     {
         VideoWriter video(folder.path() / "b.mp4", {.width = 64, .height = 48, .processors = 1});
         video.add(std::vector<std::uint8_t>(3 * 64 * 48));
@@ -144,7 +131,7 @@ TEST(Video, SameFramesGiveTheSameFile) {
 
 TEST(Video, MissingCommandSaysWhatToInstall) {
     const TemporaryFolder folder;
-    const PathOverride path(folder.path().string());
+    const test::ScopedVariable path("PATH", folder.path().string());
     const std::string message = message_of(folder.path() / "a.mp4", 2);
     EXPECT_NE(message.find("install the package ffmpeg"), std::string::npos) << message;
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
@@ -153,7 +140,7 @@ TEST(Video, MissingCommandSaysWhatToInstall) {
 TEST(Video, FailingCommandIsAnErrorWithItsMessage) {
     const TemporaryFolder folder, commands;
     put_command(commands.path(), "#!/bin/sh\necho 'no such encoder' >&2\ncat > /dev/null\nexit 3\n");
-    const PathOverride path(commands.path().string() + ":/usr/bin:/bin");
+    const test::ScopedVariable path("PATH", commands.path().string() + ":/usr/bin:/bin");
     const std::string message = message_of(folder.path() / "a.mp4", 2);
     EXPECT_NE(message.find("status 3"), std::string::npos) << message;
     EXPECT_NE(message.find("no such encoder"), std::string::npos) << message;
@@ -164,7 +151,7 @@ TEST(Video, FailingCommandIsAnErrorWithItsMessage) {
 // for the end.
 TEST(Video, CommandThatEncodesFewerFramesIsAnError) {
     const TemporaryFolder folder, commands;
-    const PathOverride path(commands.path().string() + ":/usr/bin:/bin");
+    const test::ScopedVariable path("PATH", commands.path().string() + ":/usr/bin:/bin");
     put_command(commands.path(), "#!/bin/sh\ncat > /dev/null\necho frame=1\necho frame=3\n");
     EXPECT_EQ(message_of(folder.path() / "a.mp4", 3), "");
     for (const char* script : {"#!/bin/sh\ncat > /dev/null\necho frame=3\necho frame=2\n",
@@ -184,7 +171,7 @@ TEST(Video, ALinkInThePlaceOfTheFileIsNotFollowed) {
     put_command(commands.path(), ("#!/bin/sh\nfor f in '" + folder.path().string() +
                                   "'/.a.part*; do ln -sf victim \"$f\"; done\nexec /usr/bin/ffmpeg \"$@\"\n")
                                      .c_str());
-    const PathOverride path(commands.path().string() + ":/usr/bin:/bin");
+    const test::ScopedVariable path("PATH", commands.path().string() + ":/usr/bin:/bin");
     const std::string message = message_of(folder.path() / "a.mp4", 3);
     EXPECT_NE(message.find("another file was put in the place"), std::string::npos) << message;
     std::ifstream victim(folder.path() / "victim");
@@ -196,7 +183,7 @@ TEST(Video, ALinkInThePlaceOfTheFileIsNotFollowed) {
 TEST(Video, DyingCommandRaisesNoSignal) {
     const TemporaryFolder folder, commands;
     put_command(commands.path(), "#!/bin/sh\nexec 0<&-\nexit 1\n");
-    const PathOverride path(commands.path().string() + ":/usr/bin:/bin");
+    const test::ScopedVariable path("PATH", commands.path().string() + ":/usr/bin:/bin");
     EXPECT_NE(message_of(folder.path() / "a.mp4", 50, 640, 480), "");
     put_command(commands.path(), "#!/bin/sh\nexec 0<&-\nexit 0\n");  // even when it claims success
     EXPECT_NE(message_of(folder.path() / "a.mp4", 50, 640, 480), "");

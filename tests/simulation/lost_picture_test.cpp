@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Frames in flight to a device that is lost (lost_device_layer.cpp): each says so.
 
-#include <cstdlib>
 #include <functional>
 #include <optional>
 #include <string>
@@ -12,22 +11,14 @@
 #include "core/error.h"
 #include "render/renderer.h"
 #include "tests/render/rain_scene.h"
+#include "tests/scoped_variable.h"
 
 namespace nephos {
 namespace {
 
 class LostPictures : public testing::Test {
   protected:
-    void SetUp() override {
-        if (const char* const path = std::getenv("VK_LAYER_PATH")) layer_path_ = path;
-        ::setenv("VK_LAYER_PATH", NEPHOS_LAYERS, 1);
-        ::setenv("VK_INSTANCE_LAYERS", "VK_LAYER_NEPHOS_lost_device", 1);
-        splats_.metaballs = {balls_, 0.002, 0.7};
-    }
-    void TearDown() override {
-        for (const char* name : {"VK_LAYER_PATH", "VK_INSTANCE_LAYERS", kWaits, kMemory}) ::unsetenv(name);
-        if (layer_path_) ::setenv("VK_LAYER_PATH", layer_path_->c_str(), 1);
-    }
+    void SetUp() override { splats_.metaballs = {balls_, 0.002, 0.7}; }
 
     // A lattice that fills the picture from within, and the same from far away.
     static std::vector<Metaball> lattice() {
@@ -58,7 +49,7 @@ class LostPictures : public testing::Test {
     }
 
     static constexpr const char *kWaits = "NEPHOS_LOSE_WAIT_AFTER", *kMemory = "NEPHOS_REFUSE_MEMORY_AFTER";
-    std::optional<std::string> layer_path_;  // as it was before
+    const test::ScopedVariable path_{"VK_LAYER_PATH", NEPHOS_LAYERS}, layers_{"VK_INSTANCE_LAYERS", "VK_LAYER_NEPHOS_lost_device"};
     const std::vector<Metaball> balls_ = lattice();
     Splats splats_;
     Renderer renderer() const { return Renderer({.splatting = Splatting::vulkan}); }
@@ -73,11 +64,10 @@ TEST_F(LostPictures, AreNotTakenForOthersWhileListsGrow) {
         PendingPicture first = drawing.begin(splats_, seen_from(0)),
                        second = drawing.begin(splats_, seen_from(-40000));
         ASSERT_TRUE(first.is_pending() && second.is_pending());
-        ::setenv(kWaits, std::to_string(waits).c_str(), 1);
+        const test::ScopedVariable lost(kWaits, std::to_string(waits));
         expect_lost([&] { drawing.finish(std::move(first)); }, "the first");
         expect_lost([&] { drawing.finish(std::move(second)); }, "the second");
         expect_lost([&] { drawing.draw_splats(splats_, seen_from(-40000)); }, "another");
-        ::unsetenv(kWaits);
     }
 }
 
@@ -86,10 +76,10 @@ TEST_F(LostPictures, AreWaitedForBeforeOthersTakeTheirPlace) {
     Renderer drawing = renderer();
     const Picture expected = drawing.draw_splats(splats_, seen_from(-40000));
     {
-        const PendingPicture dropped = drawing.begin(splats_, seen_from(-40000));
-        ::setenv(kWaits, "0", 1);
+        std::optional<PendingPicture> dropped = drawing.begin(splats_, seen_from(-40000));
+        const test::ScopedVariable lost(kWaits, "0");
+        dropped.reset();
     }
-    ::unsetenv(kWaits);
     for (int n = 0; n < 3; ++n)
         EXPECT_EQ(drawing.draw_splats(splats_, seen_from(-40000)).beauty, expected.beauty);
 }
@@ -110,15 +100,14 @@ TEST_F(LostPictures, OfRainThatMemoryRunsOutForLeaveNoTrace) {
     const Picture expected = draw(drawing, small);
     int refused = 0;
     for (bool again = true; again && refused < 200;) {
-        ::setenv(kMemory, std::to_string(refused).c_str(), 1);
         try {
+            const test::ScopedVariable full(kMemory, std::to_string(refused));
             draw(drawing, seen(8 + refused, 8200));
             again = false;
         } catch (const Error& error) {
             EXPECT_EQ(error.code(), ErrorCode::gpu) << error.what();
             ++refused;
         }
-        ::unsetenv(kMemory);
         EXPECT_EQ(draw(drawing, small).beauty, expected.beauty) << refused;
     }
     EXPECT_GT(refused, 8);
