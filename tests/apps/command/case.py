@@ -8,6 +8,7 @@ import csv
 import json
 import os
 import pathlib
+import resource
 import shutil
 import subprocess
 import tempfile
@@ -15,6 +16,15 @@ import unittest
 
 NEPHOS = os.path.abspath(os.environ["NEPHOS"])
 SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
+# A build whose shadow memory takes terabytes of addresses, and several times the time.
+SANITIZED = os.environ.get("NEPHOS_SANITIZED") == "1"
+
+
+def limit_addresses(size):
+    """Limits the addresses of a process that begins, where that can be."""
+    if not SANITIZED:
+        resource.setrlimit(resource.RLIMIT_AS, (size, size))
+
 
 # Without growth: what is born dies again, so that statistics have closed forms.
 NULL_SCENE = """\
@@ -96,7 +106,7 @@ class Case(unittest.TestCase):
     def call(self, *arguments, status=0, env=None, **options):
         """Runs the command; checks its exit status."""
         result = subprocess.run([NEPHOS, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True,
-                                env={**self.environment, **(env or {})}, timeout=120, **options)
+                                env={**self.environment, **(env or {})}, timeout=900 if SANITIZED else 120, **options)
         self.assertEqual(result.returncode, status, f"{arguments}\n{result.stdout}\n{result.stderr}")
         return result
 

@@ -3,7 +3,6 @@
 
 import json
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -13,7 +12,7 @@ import unittest
 
 import numpy
 
-from case import NEPHOS, Case, SCENE, SOURCE, voxels
+from case import NEPHOS, Case, SCENE, SOURCE, limit_addresses, voxels
 from verify_test import LAYERED, PLACED
 
 
@@ -456,7 +455,7 @@ class Export(Case):
                              ([*layout, "power_of_two"], True)):
             with self.subTest(place=place, value=value):
                 tampered(place, value)
-                limited = lambda: resource.setrlimit(resource.RLIMIT_AS, (6 << 30, 6 << 30))
+                limited = lambda: limit_addresses(6 << 30)
                 self.assertIn("FAIL  voxels", self.call("verify", "out", status=1, preexec_fn=limited).stdout)
         (folder / "export.json").write_text("{\n\"format\": ")
         self.refused(3, "verify", "out", says="line 2 cannot be read")
@@ -523,7 +522,7 @@ class Export(Case):
 
     def test_sizes_that_a_small_file_states(self):
         """Files of some kilobytes that state gigabytes are refused before memory is taken."""
-        limited = lambda: resource.setrlimit(resource.RLIMIT_AS, (6 << 30, 6 << 30))
+        limited = lambda: limit_addresses(6 << 30)
         folder = self.export("bricks", "--to", "bricks", "--type", "r32f")
         head = numpy.array([3, 256, 1, 1], "<u4").tobytes() + numpy.array([100], "<u8").tobytes() + numpy.array([2560, 2560, 256], "<u4").tobytes()
         table = b"".join(numpy.array([0, n % 10, n // 10, 0], "<u4").tobytes() + bytes(24) for n in range(100))

@@ -4,7 +4,6 @@
 import json
 import math
 import os
-import resource
 import struct
 import subprocess
 import sys
@@ -16,7 +15,7 @@ from PIL import Image
 from scipy import ndimage
 from scipy.io import netcdf_file
 
-from case import Case, NEPHOS
+from case import Case, NEPHOS, limit_addresses
 from fit_test import FIT, NULL
 from sweep_test import rows
 
@@ -246,7 +245,7 @@ class Stats(Case):
                 return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
             return (b"\x89PNG\r\n\x1a\n" + piece(b"IHDR", struct.pack(">IIBBBBB", width, height, depth, 0, 0, 0, 0)) +
                     piece(b"IDAT", data) + piece(b"IEND", b""))
-        limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
+        limit = lambda: limit_addresses(2 << 30)
         for width, height, status, says in ((65536, 65536, 2, "at most 65536 along a side and 1073741824 in all"),
                                             (32768, 32768, 3, "its head claims 32768 x 32768 pixels, more than"),
                                             (70000, 1, 2, "70000 x 1 pixels; at most")):
