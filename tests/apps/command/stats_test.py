@@ -15,7 +15,7 @@ from PIL import Image
 from scipy import ndimage
 from scipy.io import netcdf_file
 
-from case import Case, NEPHOS, limit_addresses
+from case import Case, NEPHOS, SANITIZED, limit_addresses
 from fit_test import FIT, NULL
 from sweep_test import rows
 
@@ -228,6 +228,7 @@ class Stats(Case):
             name = self.netcdf("bad.nc", values, ("y", "x"), **attributes)
             self.refused(3, "stats", name, "--cell-size", "50", says=says)
 
+    @unittest.skipIf(SANITIZED, "it measures memory")
     def test_a_large_mask_takes_little_more_than_its_file(self):
         """Not eight bytes for each of its values."""
         mask = numpy.zeros((4, 4096, 4096), dtype="i1")
