@@ -5,7 +5,8 @@ Python, CMake, TOML and shell files and all of the Markdown.
 
 A name with a folder stands at that place from the root of the tree, from the folder of the file that names it or one
 above, or from scenes/, as scenes name each other. One without a folder stands anywhere in the tree, or is that of a
-header of a library that the tree includes. Links and images of Markdown are followed from the document's folder.
+header of a library that the tree includes. Links and images of Markdown are followed from the document's folder, and to
+the heading behind their #.
 
 The root of the source tree is the argument; with --self-test the checker itself is tested: it must see each kind of
 wrong name."""
@@ -64,6 +65,24 @@ def prose_of(path, text):
             yield text.count("\n", 0, match.start()) + 1, match.group()
 
 
+def anchors(text):
+    """What links to the headings of a document are called, as GitHub makes them."""
+    found, fenced = set(), False
+    for line in text.splitlines():
+        fenced ^= line.startswith("```")
+        heading = re.match(r"#+ +(.*)", line)
+        if not heading or fenced:
+            continue
+        words = LINK.sub(lambda match: match.group().split("](")[0].lstrip("!["), heading.group(1))
+        name = base = re.sub(r"[^\w\- ]", "", words.lower()).strip().replace(" ", "-")
+        for n in range(1, 100):
+            if name not in found:
+                break
+            name = f"{base}-{n}"
+        found.add(name)
+    return found
+
+
 def exists(name, path, files, names):
     if "/" not in name:
         return name in names
@@ -90,13 +109,15 @@ def problems(root):
             wrong = []
             if path.endswith(".md"):
                 for match in LINK.finditer(piece):
-                    target = match.group(1).split("#")[0]
-                    if not target or re.match(r"[a-z]+:", target):
+                    target, _, anchor = match.group(1).partition("#")
+                    if re.match(r"[a-z]+:", target):
                         continue
                     count += 1
-                    at = os.path.normpath(os.path.join(os.path.dirname(path), target))
+                    at = os.path.normpath(os.path.join(os.path.dirname(path), target)) if target else path
                     if at not in files and at not in folders:
                         wrong.append((match.start(), target))
+                    elif anchor and at.endswith(".md") and anchor not in anchors(texts[at]):
+                        wrong.append((match.start(), match.group(1)))
                 # The addresses of links are checked; what they show is prose.
                 piece = LINK.sub(lambda match: match.group().replace(match.group(1), " " * len(match.group(1))), piece)
             for match in NAME.finditer(piece):
@@ -112,15 +133,16 @@ def self_test():
     tree = {
         "core/a.h": "#include <c/c.h>\n// See b.h, core/b.h, c.h, c.md and https://example.org/x.h.\n// Formerly gone.h.\n",
         "core/b.h": '/* As in shaders/gone.glsl. */ const char* name = "// made.txt";\n',
-        "docs/c.md": "[a](../core/a.h) ![b](pictures/b.png) [c](gone.md) [d](https://example.org/d.md)\n",
-        "docs/d.md": "`core/a.h` and `core/gone.cpp`, out of out/x.vdb\n",
+        "docs/c.md": "[a](../core/a.h) ![b](pictures/b.png) [c](gone.md) [d](https://example.org/d.md) "
+                     "[e](d.md#a-heading-with-code) [f](d.md#gone)\n",
+        "docs/d.md": "## A heading, with `code`\n`core/a.h` and `core/gone.cpp`, out of out/x.vdb\n",
         "docs/pictures/b.png": "",
         "tests/e.py": '"""Tests d.md."""\nX = "gone.toml"  # of gone.py\n',
         "CMakeLists.txt": "add(gone.cpp)  # as gone.cmake says\n",
         "run": "#!/bin/bash\n# Reads gone.txt\n",
     }
     expected = {"core/a.h:3: there is no gone.h", "core/b.h:1: there is no shaders/gone.glsl",
-                "docs/c.md:1: there is no gone.md", "docs/d.md:1: there is no core/gone.cpp",
+                "docs/c.md:1: there is no gone.md", "docs/c.md:1: there is no d.md#gone", "docs/d.md:2: there is no core/gone.cpp",
                 "tests/e.py:2: there is no gone.py", "CMakeLists.txt:1: there is no gone.cmake",
                 "run:2: there is no gone.txt"}
     with tempfile.TemporaryDirectory() as folder:
