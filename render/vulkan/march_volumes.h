@@ -43,7 +43,7 @@ class MarchVolumes {
     }
 
   private:
-    // What is in a buffer, which may be larger.
+    // Words in a buffer that may have room for more.
     struct Words {
         GpuBuffer buffer;
         std::size_t bytes = 0;
