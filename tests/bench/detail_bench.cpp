@@ -13,7 +13,6 @@
 
 #include "render/cloud/cloud_volume.h"
 #include "scenes/format/reader.h"
-#include "simulation/frame_detail.h"
 #include "simulation/frame_painter.h"
 #include "simulation/simulation.h"
 #include "simulation/stage.h"
@@ -29,14 +28,6 @@ constexpr int kFirst = 40, kLast = 63;  // frames of cumulus.toml: grown clouds
 const std::vector<std::string> kNear{"camera.position_m=[-1200, 1600, 1350]", "camera.target_m=[-1200, 2600, 1380]"};
 
 double processor_now_ms() { return 1000.0 * double(std::clock()) / CLOCKS_PER_SEC; }
-
-DetailedVoxels voxels_of(const Scene& scene, const FrameResult& frame) {
-    DetailedVoxels voxels;
-    voxels.density = frame.density;
-    voxels.moisture = frame.moisture;
-    voxels.setting = detail_setting(scene, std::nullopt, frame.density, frame.time_s);
-    return voxels;
-}
 
 // Samples, empty space, and all light of clouds that are new, on one thread.
 std::vector<BenchRow> preparation_rows(const Scene& scene, std::span<const FrameResult> frames) {

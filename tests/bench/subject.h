@@ -40,6 +40,9 @@ struct Subject {
 // The frames of a scene from `first` to `last`, counted from 1.
 std::vector<FrameResult> frames_of(const Scene& scene, int first, int last);
 
+// The voxels of a frame of one lattice, with the detail that its run gives them.
+DetailedVoxels voxels_of(const Scene& scene, const FrameResult& frame);
+
 // A frame of a scene of one lattice, as its run draws it; with its detail or without.
 Subject subject_of(const Scene& scene, const FrameResult& frame, bool with_detail);
 
