@@ -87,7 +87,10 @@ BenchRow row(const std::string& what, const std::pair<int, int>& size, double ms
 
 std::vector<BenchRow> card_rows(const std::filesystem::path& source) {
     Renderer card;  // or, where there is none, the processor
-    if (card.backend_name() != "vulkan") return {};
+    if (card.backend_name() != "vulkan") {
+        fmt::print("without these rows: there is no graphics card; NEPHOS_DEVICE names another Vulkan device\n\n");
+        return {};
+    }
     Renderer processor({.device = {}, .splatting = Splatting::cpu});
     const std::filesystem::path file = source / "scenes/cumulus.toml";
     const Scene scene = read_scene(file);
