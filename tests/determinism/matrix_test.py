@@ -6,7 +6,9 @@ and combinations, and over compilers and optimisation, whose programs are built 
     NEPHOS=... SOURCE=. TARGETS_LIBRARY=... /usr/bin/python3 tests/determinism/matrix_test.py [Matrix.test_...]
     ... matrix_test.py --write        writes the hashes anew: a decision for docs/adr/, not a habit"""
 
+import concurrent.futures
 import csv
+import itertools
 import json
 import os
 import pathlib
@@ -52,14 +54,14 @@ class Runner:
         log = self.folder / "targets.log"
         if targets is not None:
             log.unlink(missing_ok=True)
-            environment.update(LD_PRELOAD=os.environ["TARGETS_LIBRARY"], NEPHOS_TARGETS=str(targets),
+            environment.update(LD_PRELOAD=os.environ["TARGETS_LIBRARY"], NEPHOS_TARGETS=str(TARGETS[targets]),
                                NEPHOS_TARGETS_LOG=str(log))
         result = subprocess.run([self.program, "run", scene, "--no-render", "--quiet", "--out", out, "--threads", str(threads),
                                  *more], capture_output=True, text=True, env=environment, timeout=600)
         assert result.returncode == 0, result.stderr
         if targets is not None:  # Highway asked, and got no more than it was to get
             asked, found = map(int, log.read_text().split()[:2])
-            assert asked == targets and found & ~targets == 0, (asked, found)
+            assert asked == TARGETS[targets] and found & ~asked == 0, (targets, asked, found)
             self.fused = found & FUSED != 0
 
     def hashes(self, scene, *more, split=None, **options):
@@ -109,6 +111,25 @@ def promised(scene, lines):
     return steps_of(lines) if is_refined(scene) else lines
 
 
+def ways_of(number, steps):
+    """Options of runs of the scene of that number, the last of them interrupted at a random step."""
+    combinations = [(target, threads) for target in TARGETS for threads in THREADS]
+    if not ALL:  # a target and a number of threads each, other ones for the next scene
+        combinations = [(target, THREADS[(n + number) % 4]) for n, target in enumerate(TARGETS)]
+    for target, threads in combinations:
+        yield {"targets": target, "threads": threads}
+    draw = random.Random(number)
+    yield {"targets": "avx512", "threads": draw.choice(THREADS), "split": draw.randrange(1, steps)}
+
+
+def difference(way, found, expected):
+    """Nothing, or one line that says what differs."""
+    if found == expected:
+        return []
+    pairs = itertools.zip_longest(found, expected)
+    return [f"{way}: " + next(f"{one}, expected {other}" for one, other in pairs if one != other)]
+
+
 def golden():
     lines = {}
     for line in GOLDEN.read_text().splitlines():
@@ -141,33 +162,30 @@ class Matrix(unittest.TestCase):
     def tearDownClass(cls):
         print(f"{cls.runs} runs compared", file=sys.stderr)
 
-    def compare(self, runner, scene, expected, **options):
-        found = runner.hashes(scene, **options)
-        type(self).runs += 1
-        if is_refined(scene) and not runner.fused:
-            found, expected = steps_of(found), steps_of(expected)
-        self.assertEqual(found, expected)
-
     def every_way(self, program):
-        runner = Runner(program, self.folder)
-        draw = random.Random(7)
-        for number, scene in enumerate(self.scenes if ALL else self.scenes[::11]):  # with layers, too
-            combinations = [(target, threads) for target in TARGETS for threads in THREADS]
-            if not ALL:  # a target and a number of threads each, other ones for the next scene
-                combinations = [(target, THREADS[(n + number) % 4]) for n, target in enumerate(TARGETS)]
-            runner.fused = True
+        """Scenes beside each other, as many as there are processors: most of their runs are the start of a process."""
+        scenes = self.scenes if ALL else self.scenes[::11]  # with layers, too
+        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+            for scene, (runs, different) in zip(scenes, pool.map(lambda scene: self.compare(program, scene), scenes)):
+                type(self).runs += runs
+                with self.subTest(scene=scene.stem):
+                    self.assertEqual(different, [])
+
+    def compare(self, program, scene):
+        """How often a scene was run, and the ways to run it that gave other lines, with the first line of each that differs."""
+        with tempfile.TemporaryDirectory(dir=self.folder) as folder:
+            runner = Runner(program, folder)
             reference = runner.hashes(scene)
-            with self.subTest(scene=scene.stem):
-                self.assertEqual(promised(scene, reference), self.golden[scene.stem])
-            for target, threads in combinations:
-                with self.subTest(scene=scene.stem, target=target, threads=threads):
-                    self.compare(runner, scene, reference, targets=TARGETS[target], threads=threads)
-            with self.subTest(scene=scene.stem, library="old"):
-                type(self).runs += 1
-                self.assertEqual(promised(scene, runner.hashes(scene, old_library=True)), self.golden[scene.stem])
-            split = draw.randrange(1, last_step(reference))
-            with self.subTest(scene=scene.stem, resumed_at=split):
-                self.compare(runner, scene, reference, split=split, targets=AVX512, threads=draw.choice(THREADS))
+            expected = self.golden[scene.stem]
+            different = difference("golden", promised(scene, reference), expected)
+            different += difference("old library", promised(scene, runner.hashes(scene, old_library=True)), expected)
+            ways = list(ways_of(self.scenes.index(scene), last_step(reference)))
+            for way in ways:
+                found, same = runner.hashes(scene, **way), reference
+                if is_refined(scene) and not runner.fused:
+                    found, same = steps_of(found), steps_of(same)
+                different += difference(str(way), found, same)
+            return len(ways) + 2, different
 
     def test_this_build(self):
         self.every_way(os.environ["NEPHOS"])
@@ -192,7 +210,9 @@ class Matrix(unittest.TestCase):
         scene = self.scenes[0]
         out = self.folder / "other"
         Runner(os.environ["NEPHOS"], self.folder).run(scene, out, "--seed", "1")
-        self.assertNotEqual(promised(scene, lines_of(scene, out)), self.golden[scene.stem])
+        found = promised(scene, lines_of(scene, out))
+        name = scene.stem
+        self.assertRegex(difference("seed 1", found, self.golden[name])[0], rf"^seed 1: {name} step \d+ \w+, expected {name} ")
 
     @unittest.skipUnless(ALL, "builds the command three times: ./test --all")
     def test_other_compilers_and_no_optimisation(self):
