@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "core/error.h"
 #include "core/random.h"
 
 namespace nephos {
@@ -76,7 +78,11 @@ void append_thermals(const AutomatonOptions& options, const AirParcel& plume, co
     const double first = std::max(0.0, std::floor((age - o.life_s) / o.interval_s));
     const double rise = draw(options, plume, kRise, o.rise_m);
     const Velocity below = wind_at(options.wind, e.centre_m.z, time_s);
-    for (double n = first; n <= last && n * o.interval_s <= age; ++n) {
+    // Counted from the first: of an ellipsoid that is older than 2^53 thermals the numbers no longer rise one by one.
+    const double most = std::ceil(o.life_s / o.interval_s) + 1;
+    for (double passed = 0; passed <= most; ++passed) {
+        const double n = first + passed;
+        if (n > last || n * o.interval_s > age) break;
         Ellipsoid thermal = e;
         thermal.birth_s = e.birth_s + n * o.interval_s;
         thermal.life_s = o.life_s;
@@ -207,8 +213,9 @@ std::vector<ActiveEllipsoid> AirParcels::active(const AutomatonOptions& options,
     return result;
 }
 
-void AirParcels::advance(const AutomatonOptions& options, double time_s) {
-    const double end_s = time_s + options.time_step_s;
+void AirParcels::advance(const AutomatonOptions& options, std::uint64_t step) {
+    // The end is the time at which the next step begins, to the last bit: what is born then lives in that step.
+    const double time_s = double(step) * options.time_step_s, end_s = double(step + 1) * options.time_step_s;
     for (AirParcel& parcel : parcels_) {
         const Ellipsoid& e = parcel.ellipsoid;
         const double cell = options.placement.cell_size_m;
@@ -263,6 +270,11 @@ void AirParcels::restore(ByteReader& in, const AutomatonOptions& options) {
         p.carried.x = in.get<std::int64_t>();
         p.carried.y = in.get<std::int64_t>();
         if (!options.wind.fields.empty()) p.carried_up = in.get<std::int64_t>();
+        try {
+            check(e, options, "an ellipsoid");
+        } catch (const Error& error) {
+            throw Error(ErrorCode::io, std::string("saved state: ") + error.what());
+        }
     }
 }
 

@@ -34,9 +34,8 @@ class AirParcels {
     // options.
     std::vector<ActiveEllipsoid> active(const AutomatonOptions& options, double time_s) const;
 
-    // Advects every parcel over the step that starts at `time_s`, then replaces those that left or died by
-    // its end.
-    void advance(const AutomatonOptions& options, double time_s);
+    // Advects every parcel over step number `step` (the first is 0), then replaces those that left or died by its end.
+    void advance(const AutomatonOptions& options, std::uint64_t step);
 
     void save(ByteWriter& out, const AutomatonOptions& options) const;
     void restore(ByteReader& in, const AutomatonOptions& options);

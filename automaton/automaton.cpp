@@ -2,6 +2,7 @@
 #include "automaton/automaton.h"
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "automaton/block_field.h"
 #include "automaton/cell_motion.h"
 #include "automaton/kernels.h"
+#include "automaton/plane_bytes.h"
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/random.h"
@@ -152,7 +154,7 @@ void Automaton::step() {
     if (impl_->steps >= 0xFFFFFFFFu) throw Error(ErrorCode::usage, "a simulation has at most 2^32 - 1 steps");
     impl_->grow_and_draw();
     impl_->advect();
-    impl_->parcels.advance(impl_->options, impl_->time_s());
+    impl_->parcels.advance(impl_->options, impl_->steps);
     ++impl_->steps;
 }
 
@@ -239,6 +241,7 @@ void Automaton::restore(std::span<const std::byte> bytes) {
     if (in.rest().size() != 3 * impl_->lattice.hum.words().size_bytes()) {
         throw Error(ErrorCode::io, "saved state has another size than the scene's");
     }
+    require_clear_padding(in.rest(), impl_->options.extent);
     for (BitPlane* plane : {&impl_->lattice.hum, &impl_->lattice.act, &impl_->lattice.cld}) {
         in.get_bytes(std::as_writable_bytes(plane->words()));
     }

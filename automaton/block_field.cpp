@@ -118,7 +118,9 @@ void BlockField::add_with_images(const AutomatonOptions& options, const ActiveEl
     const double x = place((e.centre_m.x - origin.x) / cell, sides.x, extent.x);
     const double y = place((e.centre_m.y - origin.y) / cell, sides.y, extent.y);
     const double z = place((e.centre_m.z - origin.z) / cell, sides.z, extent.z);
-    const double a = e.semi_axes_m.x / cell, b = e.semi_axes_m.y / cell, c = e.semi_axes_m.z / cell;
+    // Of less than 1e-9 cells as of 1e-9: both miss all cells but those on their plane, and no single precision overflows.
+    const auto in_cells = [&](double semi_axis_m) { return std::max(semi_axis_m / cell, 1e-9); };
+    const double a = in_cells(e.semi_axes_m.x), b = in_cells(e.semi_axes_m.y), c = in_cells(e.semi_axes_m.z);
     const Rotation turn = sin_cos_deg(e.yaw_deg);
     const Vec3 half = reach_of({a, b, c}, turn);
     const int nx = images(half.x, sides.x, extent.x), ny = images(half.y, sides.y, extent.y),

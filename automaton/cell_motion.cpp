@@ -91,6 +91,9 @@ std::vector<CellMotion::Moving> CellMotion::moved(const Lattice& lattice, const 
                 Vec3 place{};
                 for (std::size_t axis = 0; axis < 3; ++axis) {
                     at[axis] = std::int64_t{cell[axis]} * kCell + kHalf + offset[axis];
+                    // Held in a cell beyond a seam, it feels the wind of where it is.
+                    fold(at[axis], std::int64_t{size_of(extent_, int(axis))} * kCell,
+                         side_of(options.boundaries, int(axis)));
                     place[int(axis)] = options.placement.origin_m[int(axis)] + double(at[axis]) / kCell * cell_m;
                 }
                 const Vec3 cells = mean_wind(options.wind, place, time_s, options.time_step_s) *

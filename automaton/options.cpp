@@ -144,7 +144,11 @@ void check(const Wind& wind, const AutomatonOptions& o) {
             require(l == 0 || level.height_m > key.levels[l - 1].height_m,
                     level_name + ".height_m: expected rising heights");
             // Linear mixing never exceeds the values it mixes: this covers every height and time.
-            displacement_of_step(level.velocity, o.time_step_s, o.placement.cell_size_m);
+            const double fastest = std::max(std::abs(level.velocity.east_m_per_s),
+                                            std::abs(level.velocity.north_m_per_s)),
+                         cells = fastest * o.time_step_s / o.placement.cell_size_m;
+            require(cells <= kMaxCellsOfStep, level_name + ": the wind moves the air by " + number(cells) +
+                                                  " cells in one step; at most 2^24 are possible");
         }
     }
     check(wind.fields);

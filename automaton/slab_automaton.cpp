@@ -190,7 +190,7 @@ void SlabAutomaton::step() {
     impl_->grow_and_draw();
     impl_->advect();
     impl_->publish();
-    impl_->parcels.advance(impl_->options, impl_->time_s());
+    impl_->parcels.advance(impl_->options, impl_->steps);
     ++impl_->steps;
 }
 

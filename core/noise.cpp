@@ -13,7 +13,7 @@
 #include "core/text.h"
 
 // Compiled once for each SIMD target of Highway and dispatched at run time.
-#ifndef HWY_DISABLED_TARGETS
+#if defined(__OPTIMIZE__) && !defined(HWY_DISABLED_TARGETS)  // with -O0 as all files (docs/determinism.md)
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
 #endif
 

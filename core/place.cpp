@@ -4,9 +4,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace nephos {
 namespace {
@@ -26,11 +26,9 @@ std::optional<int> digits(std::string_view text, std::size_t at, std::size_t cou
 }  // namespace
 
 Matrix4 ecef_from_world(const Georeference& place) {
-    constexpr double kRadians = std::numbers::pi / 180;
-    const double sin_lat = std::sin(place.latitude_deg * kRadians),
-                 cos_lat = std::cos(place.latitude_deg * kRadians);
-    const double sin_lon = std::sin(place.longitude_deg * kRadians),
-                 cos_lon = std::cos(place.longitude_deg * kRadians);
+    // Not by the system's sine: the bytes of VDB files hold this matrix.
+    const auto [cos_lat, sin_lat] = rotation_of_degrees(place.latitude_deg);
+    const auto [cos_lon, sin_lon] = rotation_of_degrees(place.longitude_deg);
     const double e2 = kFlattening * (2 - kFlattening);
     const double n = kSemiMajor_m / std::sqrt(1 - e2 * sin_lat * sin_lat);  // radius in the prime vertical
     const double h = place.height_m + (place.height_datum == HeightDatum::msl ? place.geoid_height_m : 0.0);
@@ -39,8 +37,7 @@ Matrix4 ecef_from_world(const Georeference& place) {
     const double up[3] = {cos_lat * cos_lon, cos_lat * sin_lon, sin_lat};
     const double origin[3] = {(n + h) * cos_lat * cos_lon, (n + h) * cos_lat * sin_lon,
                               (n * (1 - e2) + h) * sin_lat};
-    const double sin_heading = std::sin(place.heading_deg * kRadians),
-                 cos_heading = std::cos(place.heading_deg * kRadians);
+    const auto [cos_heading, sin_heading] = rotation_of_degrees(place.heading_deg);
     Matrix4 m{};
     for (std::size_t row = 0; row < 3; ++row) {
         m[4 * row] = cos_heading * east[row] - sin_heading * north[row];

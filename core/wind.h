@@ -68,9 +68,11 @@ struct Displacement {
     bool operator==(const Displacement&) const = default;
 };
 
+// Of a lattice: more than any is wide, and those of the steps that density is a mean of fit into 64 bits together.
+constexpr double kMaxCellsOfStep = 0x1p24;
+
 // Returns the displacement of one step of `time_step_s`, rounded up (towards east and north) to a multiple of
-// 2^-32 cell; 0 where its magnitude is below 2^-33 cell. Throws Error(usage) when it exceeds 2^30 cells, more
-// than any lattice is wide.
+// 2^-32 cell; 0 where its magnitude is below 2^-33 cell. Throws Error(usage) when it exceeds 2^30 cells.
 Displacement displacement_of_step(const Velocity& velocity, double time_step_s, double cell_size_m);
 
 }  // namespace nephos

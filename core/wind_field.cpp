@@ -106,7 +106,7 @@ Vec3 velocity_of(std::span<const WindField> fields, const Vec3& place_m, double 
 
 bool is_profile(std::span<const WindField> fields) {
     return std::ranges::all_of(fields, [](const WindField& f) {
-        return f.kind == WindFieldKind::grid &&
+        return f.kind == WindFieldKind::grid && !f.samples.empty() &&
                std::ranges::all_of(f.samples, [](const VelocitySamples& s) { return is_profile(*s.grid); });
     });
 }

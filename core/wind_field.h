@@ -56,7 +56,7 @@ struct WindField {
 Vec3 velocity_of(std::span<const WindField> fields, const Vec3& place_m, double time_s);
 
 // Returns whether the fields are no more than a profile: each a grid whose velocities are horizontal and the same all
-// over each of its levels.
+// over each of its levels. False for a grid whose files have not been read.
 bool is_profile(std::span<const WindField> fields);
 
 // Throws Error(usage) naming the field and the value that is out of its range.

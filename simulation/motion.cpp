@@ -12,8 +12,9 @@ namespace {
 constexpr double kCell = 0x1p32;  // fixed-point units in a cell
 constexpr std::int64_t kFraction = 0xffffffff;
 
-// The way of the air above one layer after each of the steps first .. last, relative to that after the last, and the
-// place of the bits then.
+// The way of the air above one layer after each of the steps first .. last, and the place of the bits then, both relative
+// to the air after the last. Differences of them are the same whatever the last step is: take those before anything is
+// rounded, or density would depend on how far the automaton is.
 struct Track {
     std::vector<std::int64_t> air, bits;
 
@@ -53,12 +54,12 @@ std::vector<Vec2> displacement_of_density(const Automaton& automaton, const Smoo
             double place = 0, weight = 0;
             for (std::uint64_t at = window; at <= of + reach; ++at) {
                 const double own = double(weights[std::size_t(at + reach - of)]);
-                place += own * double(track.bits[std::size_t(at - first)]);
+                place += own * double(track.bits[std::size_t(at - first)] -
+                                      track.air[std::size_t(to.step - first)]);
                 weight += own;
             }
-            const double air =
-                double(track.air[std::size_t(to.step - first)]) + to.fraction * double(step(to.step));
-            displacements[std::size_t(k)][axis] = (air - place / weight) / kCell;
+            displacements[std::size_t(k)][axis] =
+                (to.fraction * double(step(to.step)) - place / weight) / kCell;
         }
     }
     return displacements;

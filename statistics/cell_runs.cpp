@@ -14,7 +14,7 @@ inline constexpr std::size_t kSpareRuns = 4;
 }  // namespace nephos
 #endif
 
-#ifndef HWY_DISABLED_TARGETS
+#if defined(__OPTIMIZE__) && !defined(HWY_DISABLED_TARGETS)  // with -O0 as all files (docs/determinism.md)
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
 #endif
 

@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace nephos {
 namespace {
@@ -483,7 +484,7 @@ class Fitter {
 }  // namespace
 
 double parameter_value(const FitParameter& parameter, double unit) {
-    if (parameter.scale == Scale::log) return parameter.from * std::pow(parameter.to / parameter.from, unit);
+    if (parameter.scale == Scale::log) return geometric(parameter.from, parameter.to, unit);
     return parameter.from + unit * (parameter.to - parameter.from);
 }
 

@@ -62,7 +62,7 @@ class Measurement {
         // Cells that the wind carries away, or in across an open side, would count as deaths and births.
         counts_deaths_ = !has_wind(wind);
         tracker_ = Tracker(lattice_.boundaries);
-        if (options.tracks && !is_profile(lattice_.wind.fields))
+        if (options.tracks && !is_profile(automaton().options().wind.fields))
             throw Error(ErrorCode::usage, "clouds cannot be followed in a wind that differs within a level");
         size_range_ = default_size_range(lattice_.extent);
         observe();

@@ -12,12 +12,14 @@
 
 #include "automaton/checkpoint.h"
 #include "core/error.h"
+#include "core/math.h"
 #include "core/random.h"
 #include "core/text.h"
 #include "core/wind_field.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/writer.h"
 #include "simulation/layer_simulation.h"
+#include "simulation/scene_files.h"
 
 namespace nephos {
 namespace {
@@ -33,7 +35,7 @@ bool is_sampled(Design design) { return design != Design::grid && design != Desi
 std::string value_at(const Axis& axis, double unit) {
     switch (axis.scale) {
         case Scale::log:
-            return number_text(axis.from * std::pow(axis.to / axis.from, unit));
+            return number_text(geometric(axis.from, axis.to, unit));
         case Scale::integer:
             return fmt::format("{}",
                                std::min(std::floor(axis.from + unit * (axis.to - axis.from + 1)), axis.to));
@@ -172,7 +174,7 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
                                   fmt::join(lattices, ", "))));
     }
     if (!scene_.layers.empty() && options_.layer.empty()) options_.layer = lattices.front();
-    if (options_.tracks && !is_profile(automaton_options(scene_, measured_lattice()).wind.fields))
+    if (options_.tracks && !is_profile(automaton_options(with_files(scene_), measured_lattice()).wind.fields))
         throw Error(ErrorCode::usage,
                     options_.scene_file.string() +
                         ": has a wind that differs within a level, and clouds are followed only in one "

@@ -23,6 +23,7 @@
 #include "core/text.h"
 #include "density/vdb/vdb_file.h"
 #include "scenes/format/reader.h"
+#include "simulation/scene_files.h"
 
 namespace nephos {
 namespace {
@@ -71,7 +72,7 @@ void write_slabs(const SlabAutomaton& slab, int levels_each, const std::filesyst
 
 void simulate(const Arguments& a) {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, std::size_t(a.threads));
-    const Scene scene = read_scene(a.scene, a.settings, SceneUse::without_frames);
+    const Scene scene = with_files(read_scene(a.scene, a.settings, SceneUse::without_frames));
     if (!scene.layers.empty() || scene.initial_state_file)
         throw Error(ErrorCode::usage,
                     a.scene + ": one lattice without layers and without initial_state is expected");
@@ -145,8 +146,8 @@ int parse(CLI::App& app, int argc, char** argv, Arguments& a) {
 }  // namespace nephos
 
 int main(int argc, char** argv) {
-    MPI_Init(&argc, &argv);
-    int rank = 0;
+    int provided = 0, rank = 0;
+    MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     nephos::Arguments arguments;
     CLI::App app("Steps one lattice on several processes", "nephos-mpi");

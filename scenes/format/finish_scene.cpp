@@ -35,10 +35,8 @@ void check_name(const SectionReader& reader, const Scene& scene) {
                   "expected 1 to 100 letters, digits, `-`, `_` or `.`, starting with none of `-` and `.`");
 }
 
-// The displacement of one step is held as cells * 2^32 in 64 bits.
 void check_wind_speed(const SectionReader& reader, const Scene& scene) {
     if (!reader.sound({"wind", "time", "lattice"})) return;
-    constexpr double kMostCells = 1 << 30;
     double fastest = 0;
     for (const WindKeyframe& keyframe : scene.automaton.wind.keyframes) {
         for (const WindLevel& level : keyframe.levels) {
@@ -47,9 +45,9 @@ void check_wind_speed(const SectionReader& reader, const Scene& scene) {
         }
     }
     const double cells = fastest * scene.automaton.time_step_s / scene.automaton.placement.cell_size_m;
-    if (cells <= kMostCells) return;
+    if (cells <= kMaxCellsOfStep) return;
     reader.report("wind", "the wind moves " + number_text(cells) + " cells in one step",
-                  "expected at most " + number_text(kMostCells) +
+                  "expected at most " + number_text(kMaxCellsOfStep) +
                       " cells: a shorter `time.step_s`, a larger `lattice.cell_size_m` or less wind");
 }
 

@@ -118,6 +118,8 @@ TEST(WindField, GridsAreLinearInPlaceAndTime) {
     EXPECT_EQ(velocity_of(std::span(&field, 1), {50, 50, 50}, 5).x, 2.5);
     EXPECT_EQ(velocity_of(std::span(&field, 1), {50, 50, 50}, 25).x, 10);
     EXPECT_FALSE(is_profile(std::span(&field, 1)));
+    const WindField unread{.kind = WindFieldKind::grid, .files = {"wind.vdb"}};
+    EXPECT_FALSE(is_profile(std::span(&unread, 1))) << "nobody knows yet";
     const WindField levels = grid_field({2, 2, 3}, [](int, int, int k) { return Vec3(k, 1, 0); });
     EXPECT_TRUE(is_profile(std::span(&levels, 1)));
 }
@@ -377,6 +379,23 @@ AutomatonOptions cloudy_vortex() {
     o.wind.keyframes = {{0, {{0, {0, 0}}, {2000, {2, 0}}}}};
     o.wind.fields = {circulation(WindFieldKind::vortex, 1000, 12, 1600, 1600)};
     return o;
+}
+
+// The content of the last cell goes into the first, which is taken for good: held in the last cell, at its place in
+// the first, it has the wind of the first, which is none.
+TEST(CellMotion, AContentThatIsHeldAcrossASeamFeelsTheWindOfItsPlace) {
+    AutomatonOptions o = still_options({8, 1, 1});
+    o.boundaries.x = Boundary::periodic;
+    o.wind.fields = {grid_field(
+        {8, 1, 1}, [](int i, int, int) { return Vec3(i == 7 ? 10 : 0, 0, 0); }, {5, 5, 5}, 10)};
+    Lattice lattice = empty_lattice(o.extent);
+    lattice.cld.set(0, 0, 0, true);
+    lattice.cld.set(7, 0, 0, true);
+    CellMotion motion(o.extent);
+    for (int step = 0; step < 5; ++step) {
+        motion.step(lattice, o, step);
+        EXPECT_TRUE(lattice.cld.get(0, 0, 0) && lattice.cld.get(7, 0, 0)) << step;
+    }
 }
 
 // Ellipsoids move on the same way as the bits: half a turn in pi R / v seconds.

@@ -5,8 +5,10 @@
 #include "automaton/checkpoint.h"
 
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -235,6 +237,51 @@ TEST(AtomicFile, LeavesAFileThatAnotherPutInThePlaceOfItsTemporaryOne) {
     };
     EXPECT_THROW(write_atomically(folder / "file", fail), Error);
     EXPECT_FALSE(fs::exists(temporary));
+}
+
+// Planes are the last of a state. Their padding is read by kernels that list cells: a forged bit there is a cell beyond the row.
+TEST(Checkpoint, CellsBeyondTheLatticeAreRefused) {
+    AutomatonOptions o;
+    o.extent = {40, 12, 8};
+    o.field.background = {0.1, 0.01, 0.1};
+    Automaton automaton(o);
+    automaton.step();
+    const std::vector<std::byte> before = automaton.save();
+    const std::size_t words = before.size() - 3 * 12 * 8 * sizeof(std::uint64_t);
+    for (const std::size_t word : {0, 11, 95, 96, 287}) {
+        std::vector<std::byte> forged = before;
+        forged[words + 8 * word + 5] |= std::byte{1};  // cell 40
+        EXPECT_THROW(automaton.restore(forged), Error) << word;
+        EXPECT_EQ(automaton.save(), before);
+        forged = before;
+        forged[words + 8 * word + 4] |= std::byte{0x80};  // cell 39
+        EXPECT_NO_THROW(automaton.restore(forged)) << word;
+        automaton.restore(before);
+    }
+}
+
+// Numbers of an ellipsoid that no scene may have.
+TEST(Checkpoint, ImpossibleEllipsoidsAreRefused) {
+    AutomatonOptions o;
+    o.extent = {16, 16, 8};
+    o.field.ellipsoids.resize(1);
+    Automaton automaton(o);
+    const std::vector<std::byte> before = automaton.save();
+    const std::size_t first = sizeof(std::uint32_t) + sizeof(Extent) + sizeof(std::uint64_t) +
+                              8 * sizeof(Displacement) +
+                              sizeof(std::uint64_t);  // behind the number of ellipsoids
+    for (std::size_t number = 0; number < 10; ++number) {
+        std::vector<std::byte> forged = before;
+        const double value = std::numeric_limits<double>::quiet_NaN();
+        std::memcpy(forged.data() + first + sizeof value * number, &value, sizeof value);
+        try {
+            automaton.restore(forged);
+            ADD_FAILURE() << number;
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::io);
+        }
+        EXPECT_EQ(automaton.save(), before);
+    }
 }
 
 TEST(Checkpoint, AFailedRestoreChangesNothing) {

@@ -64,7 +64,7 @@ class Runner:
             assert asked == TARGETS[targets] and found & ~asked == 0, (targets, asked, found)
             self.fused = found & FUSED != 0
 
-    def hashes(self, scene, *more, split=None, **options):
+    def hashes(self, scene, more=(), split=None, **options):
         """The lines of the golden file for a scene; run up to step `split`, and then resumed, when that is given."""
         out = self.folder / "out"
         shutil.rmtree(out, ignore_errors=True)
@@ -118,6 +118,7 @@ def ways_of(number, steps):
         combinations = [(target, THREADS[(n + number) % 4]) for n, target in enumerate(TARGETS)]
     for target, threads in combinations:
         yield {"targets": target, "threads": threads}
+    yield {"more": ("--checkpoint-every", "0.0001")}  # after each step
     draw = random.Random(number)
     yield {"targets": "avx512", "threads": draw.choice(THREADS), "split": draw.randrange(1, steps)}
 

@@ -330,7 +330,7 @@ class Simulation:
 
     def carry_parcels(self, time_s):
         scene = self.scene
-        end_s = time_s + scene.step_s
+        end_s = (self.steps + 1) * scene.step_s
         for index, parcel in enumerate(self.parcels):
             if parcel.carried and time_s >= parcel.birth_s:
                 east, north = scene.wind_at(parcel.centre_m[2], time_s)

@@ -154,5 +154,28 @@ TEST(Motion, AFrameOnAStepOfWholeCellsIsThatOfTheStep) {
     }
 }
 
+// Where density lies is a matter of its own steps: how far the automaton is when somebody asks would make voxels depend on when
+// a run was saved. Winds and a kernel whose mean place is no binary fraction.
+TEST(Motion, WhereDensityLiesDoesNotDependOnLaterSteps) {
+    for (const Velocity wind : {Velocity{42.3, -2}, Velocity{63.45, 7.7}, Velocity{0.1, -999.9}}) {
+        Scene scene = drifting(wind.east_m_per_s, wind.north_m_per_s);
+        scene.automaton.time_step_s = 30;
+        SmoothingOptions smoothing = scene.density.smoothing;
+        smoothing.kernel = SmoothingKernel::box;
+        smoothing.t0 = 3;
+        Automaton automaton(scene.automaton);
+        while (automaton.steps() < 20) automaton.step();
+        const Moment moments[] = {{16, 1}, {16, 0.3}, {17, 0}};
+        std::vector<std::vector<Vec2>> first;
+        for (const Moment& moment : moments)
+            first.push_back(displacement_of_density(automaton, smoothing, 17, moment));
+        for (int later = 0; later < 40; ++later) {
+            automaton.step();
+            for (std::size_t n = 0; n < first.size(); ++n)
+                ASSERT_EQ(displacement_of_density(automaton, smoothing, 17, moments[n]), first[n]) << later;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace nephos

@@ -59,6 +59,22 @@ class Ranks(Mpi):
                 for processes in (1, 2, 3, 4):
                     self.assertEqual(self.mpirun(processes, scene, "--hash").stdout, expected, (sides, wind, processes))
 
+    def test_a_wind_of_files_is_read(self):
+        """One that is a profile gives the bits of one process; one that is not is refused, as it is without a file."""
+        velocity = "[density]\nwrite_velocity = true\n[frames]\ncount = 1\n"
+        sides = '["periodic", "periodic", "open"]'
+        vortex = '[[wind_field]]\nkind = "vortex"\nx_m = 2400\ny_m = 1000\nradius_m = 600\nspeed_m_per_s = 30\n'
+        for name, wind in (("profile", WIND), ("vortex", vortex)):
+            scene = self.write(f"{name}.toml", SCENE.format(boundaries=sides, wind=wind) + velocity)
+            self.call("run", scene, "--no-render", "--set", "time.steps=2", "--out", name)
+            files = f'[[wind_field]]\nkind = "grid"\ngrid = "vel"\nfiles = ["{name}/density/{name}_0001.vdb"]\n'
+            self.write(f"{name}-of-file.toml", SCENE.format(boundaries=sides, wind=files))
+        expected = self.hashes("profile-of-file.toml")
+        self.assertNotEqual(expected, self.hashes(self.write("calm.toml", SCENE.format(boundaries=sides, wind=""))))
+        for processes in (1, 3):
+            self.assertEqual(self.mpirun(processes, "profile-of-file.toml", "--hash").stdout, expected)
+        self.assertIn("from level to level", self.mpirun(2, "vortex-of-file.toml", status=2).stderr)
+
     def test_statistics_and_bits_are_those_of_one_process(self):
         import pyopenvdb
         scene = self.write("scene.toml", SCENE.format(boundaries='["periodic", "periodic", "open"]', wind=WIND))
