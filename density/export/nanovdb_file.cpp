@@ -2,6 +2,7 @@
 #include "density/export/nanovdb_file.h"
 
 #include <algorithm>
+#include <cstring>
 #include <istream>
 #include <new>
 #include <sstream>
@@ -96,6 +97,7 @@ FloatGrid::Ptr float_grid_of(const nanovdb::GridHandle<>& handle) {
 void send_grid(int file, const Extent& extent, SandboxWriter& writer) {
     __gnu_cxx::stdio_filebuf<char> buffer(file, std::ios::in | std::ios::binary);
     std::istream stream(&buffer);
+    stream.exceptions(std::ios::badbit);  // with the system's error
     const auto handles = nanovdb::io::readGrids(stream);
     const FloatGrid::Ptr grid = handles.size() == 1 ? float_grid_of(handles.front()) : nullptr;
     if (grid == nullptr) throw std::runtime_error("it holds no float grid of 32, 16 or 8 bits");
@@ -133,6 +135,11 @@ DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const
                 send_grid(file.get(), extent, writer);
             } catch (const std::bad_alloc&) {
                 throw;
+            } catch (const std::ios_base::failure& error) {
+                const bool of_system = error.code().category() != std::iostream_category();
+                throw std::runtime_error(of_system ? std::string("cannot read: ") +
+                                                         std::strerror(error.code().value())
+                                                   : "it is no NanoVDB file, or is damaged: it ends early");
             } catch (const std::exception& error) {
                 throw std::runtime_error(std::string("it is no NanoVDB file, or is damaged: ") +
                                          error.what());

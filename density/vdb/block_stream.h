@@ -20,7 +20,8 @@ void send_tile(SandboxWriter& writer, const openvdb::Coord& origin, float value)
 inline void send_end(SandboxWriter& writer) { writer.value(Record::end); }
 
 // The parent's part. Return the lowest corner of a block, and the grid of all blocks up to the end; throw
-// std::runtime_error when a block lies beside the extent or a value is negative or not finite.
+// std::runtime_error when a block lies beside the extent, a value is negative or not finite, or the nodes of the tree
+// take more than reader.memory_bytes().
 openvdb::Coord receive_origin(SandboxReader& reader, const Extent& extent);
 DensityGrid receive_blocks(SandboxReader& reader, const Extent& extent, const Placement& placement);
 

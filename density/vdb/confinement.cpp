@@ -54,10 +54,12 @@ std::size_t address_space() {
     throw std::runtime_error("cannot confine the process that reads it: " + step + ": " + std::strerror(number));
 }
 
-void set_limit(__rlimit_resource resource, std::size_t value) {
+// The soft limit is `value`, the hard one `grace` above it.
+void set_limit(__rlimit_resource resource, std::size_t value, std::size_t grace = 0) {
     rlimit limit{};
     if (::getrlimit(resource, &limit) != 0) fail("getrlimit", errno);
-    limit.rlim_cur = limit.rlim_max = std::min(rlim_t(value), limit.rlim_max);
+    limit.rlim_max = std::min(rlim_t(value) + grace, limit.rlim_max);
+    limit.rlim_cur = std::min(rlim_t(value), limit.rlim_max);
     if (::setrlimit(resource, &limit) != 0) fail("setrlimit", errno);
 }
 
@@ -85,28 +87,42 @@ void close_others(std::vector<int> kept) {
     close_until(~0u);
 }
 
-// fork() copies private memory only: what is shared, such as a buffer of a device, is still that of the parent.
-void stop_sharing() {
-    struct Mapping {
-        std::uintptr_t begin, end;
-        bool executed;
-    };
-    std::vector<Mapping> writable;
+struct Mapping {
+    std::uintptr_t begin = 0, end = 0;
+    std::string rights, file;
+};
+
+std::vector<Mapping> mappings() {
+    std::vector<Mapping> all;
     std::ifstream maps("/proc/self/maps");
     if (!maps) fail("/proc/self/maps", errno);
     for (std::string line; std::getline(maps, line);) {
         std::istringstream fields(line);
-        std::uintptr_t begin = 0, end = 0;
+        Mapping each;
         char dash = 0;
-        std::string rights;
-        fields >> std::hex >> begin >> dash >> end >> rights;
-        if (rights.size() != 4 || rights[1] != 'w') continue;
-        if (rights[3] == 's' || rights[2] == 'x') writable.push_back({begin, end, rights[3] != 's'});
+        std::string offset, device, inode;
+        fields >> std::hex >> each.begin >> dash >> each.end >> each.rights >> offset >> device >> inode;
+        std::getline(fields >> std::ws, each.file);
+        if (each.rights.size() == 4) all.push_back(each);
     }
-    for (const Mapping& each : writable)
-        if (::mprotect(reinterpret_cast<void*>(each.begin), each.end - each.begin,
-                       each.executed ? PROT_READ | PROT_WRITE : PROT_READ) != 0)
-            fail("mprotect", errno);
+    return all;
+}
+
+// fork() copies private memory only: what is shared, such as a buffer of a device, is still that of the parent. Empty memory
+// takes its place, whatever its rights are: mprotect() could change them. glibc converts texts by its table, which is opened
+// for reading alone, so that nothing can make it writable.
+void stop_sharing() {
+    for (const Mapping& each : mappings()) {
+        void* const begin = reinterpret_cast<void*>(each.begin);
+        const std::size_t size = each.end - each.begin;
+        if (each.rights[3] == 's') {
+            if (each.rights[1] != 'w' && each.file.ends_with("/gconv-modules.cache")) continue;
+            constexpr int kFlags = MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED | MAP_NORESERVE;
+            if (::mmap(begin, size, PROT_READ, kFlags, -1, 0) == MAP_FAILED) fail("mmap", errno);
+        } else if (each.rights[1] == 'w' && each.rights[2] == 'x') {
+            if (::mprotect(begin, size, PROT_READ | PROT_WRITE) != 0) fail("mprotect", errno);
+        }
+    }
 }
 
 void check(int result) {
@@ -119,18 +135,18 @@ void filter_system_calls() {
     if (filter == nullptr) fail("seccomp", ENOMEM);
     for (const int call :
          {// files that are open
-          SCMP_SYS(read), SCMP_SYS(readv), SCMP_SYS(pread64), SCMP_SYS(write), SCMP_SYS(writev), SCMP_SYS(lseek),
-          SCMP_SYS(close), SCMP_SYS(fstat), SCMP_SYS(poll), SCMP_SYS(ppoll),
+          SCMP_SYS(read), SCMP_SYS(readv), SCMP_SYS(pread64), SCMP_SYS(write), SCMP_SYS(writev),
+          SCMP_SYS(lseek), SCMP_SYS(close), SCMP_SYS(fstat), SCMP_SYS(poll), SCMP_SYS(ppoll),
           // memory
-          SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(madvise), SCMP_SYS(brk),
+          SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(brk),
           // threads and locks, of TBB in OpenVDB
-          SCMP_SYS(futex), SCMP_SYS(set_robust_list), SCMP_SYS(rseq), SCMP_SYS(set_tid_address), SCMP_SYS(sched_yield),
-          SCMP_SYS(sched_getaffinity), SCMP_SYS(getpid), SCMP_SYS(gettid),
+          SCMP_SYS(futex), SCMP_SYS(set_robust_list), SCMP_SYS(rseq), SCMP_SYS(set_tid_address),
+          SCMP_SYS(sched_yield), SCMP_SYS(sched_getaffinity), SCMP_SYS(getpid), SCMP_SYS(gettid),
           // signals of its own, abort()
           SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
           // time and the end
-          SCMP_SYS(getrandom), SCMP_SYS(clock_gettime), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep), SCMP_SYS(pause),
-          SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group)})
+          SCMP_SYS(getrandom), SCMP_SYS(clock_gettime), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep),
+          SCMP_SYS(pause), SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group)})
         check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, call, 0));
     // glibc's fstat(); a path would be refused.
     check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(newfstatat), 1,
@@ -138,9 +154,13 @@ void filter_system_calls() {
     // No memory that is executed, and none that is shared.
     check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(mmap), 2,
                              SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0), SCMP_A3(SCMP_CMP_MASKED_EQ, MAP_SHARED, 0)));
-    // A stack of a thread becomes writable so; what is shared stays as it is, because private memory alone is mapped now.
+    // A stack of a thread becomes writable so. Private memory alone is mapped now, but for what nobody can write.
     check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(mprotect), 1,
                              SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0)));
+    // What allocators give back and ask for, and nothing that reaches the file behind a mapping, as MADV_REMOVE does.
+    for (const int advice : {MADV_DONTNEED, MADV_FREE, MADV_HUGEPAGE, MADV_NOHUGEPAGE})
+        check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(madvise), 1,
+                                 SCMP_A2(SCMP_CMP_EQ, scmp_datum_t(advice))));
     // Threads, and neither processes nor namespaces; signals to itself, as abort() sends; the flags of an open file.
     constexpr scmp_datum_t kNamespaces = CLONE_NEWNS | CLONE_NEWCGROUP | CLONE_NEWUTS | CLONE_NEWIPC | CLONE_NEWUSER |
                                          CLONE_NEWPID | CLONE_NEWNET;
@@ -158,9 +178,10 @@ void filter_system_calls() {
 void confine(pid_t parent, std::span<const int> kept, std::size_t memory_bytes, double seconds) {
     if (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0) fail("prctl", errno);
     if (::getppid() != parent) ::_exit(1);  // it ended before that
-    for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGPIPE}) ::signal(signal, SIG_DFL);
+    for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGPIPE, SIGXCPU})
+        ::signal(signal, SIG_DFL);
     set_limit(RLIMIT_CORE, 0);
-    set_limit(RLIMIT_CPU, std::size_t(seconds) + 1);
+    set_limit(RLIMIT_CPU, std::size_t(seconds) + 1, 5);  // the soft limit sends SIGXCPU, the hard one SIGKILL
     silence({STDIN_FILENO, STDOUT_FILENO}, kept);
     if (NEPHOS_SANITIZED) return;
     silence({STDERR_FILENO}, kept);

@@ -10,6 +10,7 @@
 #include <limits>
 #include <new>
 #include <sstream>
+#include <thread>
 #include <vector>
 
 #include <fcntl.h>
@@ -18,10 +19,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "density/vdb/confinement.h"
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "density/vdb/confinement.h"
 
 namespace nephos {
 namespace {
@@ -36,6 +37,7 @@ constexpr std::size_t kChunk = std::size_t{1} << 18;
 constexpr std::size_t kMaxText = std::size_t{1} << 16;
 constexpr int kMaxAttempts = 3;
 constexpr auto kStallTime = std::chrono::seconds(8);
+constexpr const char* kTooLong = "reading it takes longer than allowed";
 
 // Thrown inside run_sandboxed when the child seems to wait for a lock that nobody holds.
 struct Stalled {};
@@ -56,8 +58,7 @@ void send_all(int fd, const void* data, std::size_t size) {
         child(writer);
         writer.finish();
     } catch (const std::bad_alloc&) {
-        SandboxWriter(fd).fail("reading it takes more than the " + std::to_string(limits.memory_bytes >> 20) +
-                               " MiB of memory that are allowed");
+        SandboxWriter(fd).fail(too_large(limits.memory_bytes));
     } catch (const std::exception& error) {
         SandboxWriter(fd).fail(error.what());
     } catch (...) {
@@ -84,10 +85,11 @@ std::pair<char, long> process_state(pid_t pid) {
 
 class PipeReader final : public SandboxReader {
   public:
-    PipeReader(int fd, pid_t pid, std::size_t most_bytes, Clock::time_point deadline, bool last_attempt)
+    PipeReader(int fd, pid_t pid, const SandboxLimits& limits, Clock::time_point deadline, bool last_attempt)
         : fd_(fd),
           pid_(pid),
-          most_(most_bytes),
+          memory_(limits.memory_bytes),
+          most_(limits.most_bytes),
           deadline_(deadline),
           watch_for_stall_(!last_attempt),
           quiet_since_(Clock::now()) {}
@@ -103,6 +105,11 @@ class PipeReader final : public SandboxReader {
             left_ -= part;
         }
     }
+
+    std::size_t memory_bytes() const override { return memory_; }
+
+    // Returns when the child must have ended.
+    Clock::time_point deadline() const { return deadline_; }
 
     void expect_end() {
         std::uint32_t length = 0;
@@ -146,6 +153,8 @@ class PipeReader final : public SandboxReader {
 
     // Reads what has come: values of a few bytes one by one would cost two system calls each.
     void refill() {
+        deadline_ +=
+            Clock::now() - arrival_;  // what the caller did with the last of it is not the child's time
         for (;;) {
             wait_for_data();
             const ssize_t got = ::read(fd_, buffer_.data(), buffer_.size());
@@ -157,6 +166,7 @@ class PipeReader final : public SandboxReader {
             watch_for_stall_ = false;
             at_ = 0;
             arrived_ = std::size_t(got);
+            arrival_ = Clock::now();
             return;
         }
     }
@@ -164,7 +174,7 @@ class PipeReader final : public SandboxReader {
     void wait_for_data() {
         for (;;) {
             const auto now = Clock::now();
-            if (now >= deadline_) throw std::runtime_error("reading it takes longer than allowed");
+            if (now >= deadline_) throw std::runtime_error(kTooLong);
             const auto left =
                 std::chrono::duration_cast<std::chrono::milliseconds>(deadline_ - now).count() + 1;
             pollfd poll_fd{fd_, POLLIN, 0};
@@ -186,8 +196,9 @@ class PipeReader final : public SandboxReader {
 
     int fd_;
     pid_t pid_;
+    std::size_t memory_;
     std::size_t most_;  // bytes that may still come
-    Clock::time_point deadline_;
+    Clock::time_point deadline_, arrival_ = Clock::now();
     bool watch_for_stall_;
     Clock::time_point quiet_since_;
     long used_ = -1;
@@ -202,19 +213,43 @@ class Child {
     Child(pid_t pid, std::string_view parser) : pid_(pid), parser_(parser) {}
     Child(const Child&) = delete;
     Child& operator=(const Child&) = delete;
-    ~Child() { end(true); }
-    // Waits for it, killing it first when asked to; returns how it ended, in words, "" when as it should.
-    std::string end(bool kill) {
-        if (pid_ <= 0) return "";
-        if (kill) ::kill(pid_, SIGKILL);
-        int status = 0;
+    ~Child() { kill(); }
+
+    void kill() {
+        if (pid_ <= 0) return;
+        ::kill(pid_, SIGKILL);
+        has_ended(0);
+    }
+
+    // Waits for its end, which it may put off for ever, and kills it at the deadline. Returns how it ended, in words, ""
+    // when as it should.
+    std::string end_by(Clock::time_point deadline) {
+        while (!has_ended(WNOHANG)) {
+            if (Clock::now() >= deadline) {
+                kill();
+                return kTooLong;
+            }
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        return how_it_ended();
+    }
+
+  private:
+    bool has_ended(int options) {
         pid_t result;
         do {
-            result = ::waitpid(pid_, &status, 0);
+            result = ::waitpid(pid_, &status_, options);
         } while (result < 0 && errno == EINTR);
+        if (result == 0) return false;
+        if (result < 0) status_ = 0;  // unknown
         pid_ = -1;
-        if (result < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 0)) return "";
-        if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) return "reading it takes longer than allowed";
+        return true;
+    }
+
+    std::string how_it_ended() const {
+        const int status = status_;
+        if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return "";
+        if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) return kTooLong;
         // The system's answer to memory that is short, in the machine or in a control group.
         if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
             return "the system killed the process that read it, as it does where memory is short";
@@ -227,8 +262,8 @@ class Child {
         return "it is damaged: " + parser_ + " ended while reading it";
     }
 
-  private:
     pid_t pid_;
+    int status_ = 0;
     std::string parser_;
 };
 
@@ -246,16 +281,16 @@ void attempt(std::string_view parser, const SandboxLimits& limits, std::span<con
     if (pid == 0) run_child(self, ends[1], limits, kept, child);
     in.close();
     Child process(pid, parser);
-    PipeReader reader(out.get(), pid, limits.most_bytes, deadline, last_attempt);
+    PipeReader reader(out.get(), pid, limits, deadline, last_attempt);
     try {
         parent(reader);
         reader.expect_end();
     } catch (const std::runtime_error& error) {
         if (*error.what() != '\0') throw;
-        const std::string how = process.end(false);
+        const std::string how = process.end_by(reader.deadline());
         throw std::runtime_error(how.empty() ? "the reading process ended early" : how);
     }
-    process.end(false);
+    process.kill();  // all has come: there is nothing to wait for
 }
 
 }  // namespace
@@ -304,6 +339,11 @@ std::string SandboxReader::text() {
     std::string result(size, ' ');
     bytes(result.data(), result.size());
     return result;
+}
+
+std::string too_large(std::size_t memory_bytes) {
+    return "reading it takes more than the " + std::to_string(memory_bytes >> 20) +
+           " MiB of memory that are allowed";
 }
 
 std::string clamp_message(std::string_view text, std::size_t length) {

@@ -16,6 +16,7 @@
 #include <cstring>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -56,6 +57,8 @@ class SandboxReader {
   public:
     virtual ~SandboxReader() = default;
     virtual void bytes(void* data, std::size_t size) = 0;
+    // Returns how much memory may be taken for what comes: that which the child may take.
+    virtual std::size_t memory_bytes() const { return std::numeric_limits<std::size_t>::max(); }
     template <class T>
     T value() {
         static_assert(std::is_trivially_copyable_v<T>);
@@ -74,6 +77,9 @@ class SandboxReader {
 void run_sandboxed(const std::filesystem::path& subject, std::string_view parser, const SandboxLimits& limits,
                    std::span<const int> kept, const std::function<void(SandboxWriter&)>& child,
                    const std::function<void(SandboxReader&)>& parent);
+
+// Returns the reason of an error where reading takes more memory than this.
+std::string too_large(std::size_t memory_bytes);
 
 // Returns `text` without control characters, cut to `length`.
 std::string clamp_message(std::string_view text, std::size_t length = 300);

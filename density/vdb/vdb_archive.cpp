@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/vdb/vdb_archive.h"
 
+#include <cerrno>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include <malloc.h>
 #include <unistd.h>
@@ -14,7 +16,28 @@ namespace nephos {
 using openvdb::GridBase;
 using openvdb::io::GridDescriptor;
 
-CheckedBuffer::CheckedBuffer(int fd) : __gnu_cxx::stdio_filebuf<char>(fd, std::ios::in | std::ios::binary) {
+namespace {
+
+using FileBuffer = __gnu_cxx::stdio_filebuf<char>;
+
+// Passes on where a seek has led. A place that no file has is not the system's failure but the file's.
+std::streampos checked(std::streampos position) {
+    if (position == std::streampos(std::streamoff(-1)) && errno != 0 && errno != EINVAL && errno != EOVERFLOW)
+        throw std::ios_base::failure("cannot seek", std::error_code(errno, std::generic_category()));
+    return position;
+}
+
+// Returns the size of an open file, and goes to its beginning.
+std::int64_t size_from_beginning(int fd) {
+    const off_t size = ::lseek(fd, 0, SEEK_END);
+    if (size < 0 || ::lseek(fd, 0, SEEK_SET) != 0)
+        throw std::runtime_error(std::string("cannot read: ") + std::strerror(errno));
+    return std::int64_t(size);
+}
+
+}  // namespace
+
+CheckedBuffer::CheckedBuffer(int fd) : FileBuffer(fd, std::ios::in | std::ios::binary) {
     if (!is_open()) throw std::runtime_error("it cannot be read");
 }
 
@@ -24,7 +47,7 @@ std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
     constexpr std::streamsize kLeastBlock = 24;
     if (negated_ > kLeastBlock && size == negated_ && ::malloc_usable_size(to) < std::size_t(size))
         throw std::runtime_error("it is damaged: a chunk of " + std::to_string(size) + " bytes where fewer belong");
-    const std::streamsize got = __gnu_cxx::stdio_filebuf<char>::xsgetn(to, size);
+    const std::streamsize got = FileBuffer::xsgetn(to, size);
     negated_ = 0;
     if (size == sizeof negated_ && got == size) {
         std::int64_t number = 0;
@@ -34,9 +57,19 @@ std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
     return got;
 }
 
+CheckedBuffer::pos_type CheckedBuffer::seekoff(off_type offset, std::ios_base::seekdir from,
+                                               std::ios_base::openmode which) {
+    errno = 0;
+    return checked(FileBuffer::seekoff(offset, from, which));
+}
+
+CheckedBuffer::pos_type CheckedBuffer::seekpos(pos_type position, std::ios_base::openmode which) {
+    errno = 0;
+    return checked(FileBuffer::seekpos(position, which));
+}
+
 VdbArchive::VdbArchive(int fd) : buffer_(fd), stream_(&buffer_), stream_metadata_(new openvdb::io::StreamMetadata) {
-    file_size_ = std::int64_t(::lseek(fd, 0, SEEK_END));
-    ::lseek(fd, 0, SEEK_SET);
+    file_size_ = size_from_beginning(fd);
     stream_.exceptions(std::ios::badbit | std::ios::failbit);
     readHeader(stream_);
     openvdb::io::setStreamMetadataPtr(stream_, stream_metadata_, false);

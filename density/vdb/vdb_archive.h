@@ -7,12 +7,12 @@
 // checks offsets before it follows them.
 
 #include <cstdint>
+#include <ios>
 #include <istream>
 #include <string>
 #include <vector>
 
 #include <ext/stdio_filebuf.h>
-
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>
@@ -20,7 +20,8 @@
 namespace nephos {
 
 // An open file. OpenVDB 10.0.1 (bloscFromStream, unzipFromStream) reads as many bytes as a negative size of a chunk says
-// into a buffer of another size, and compares afterwards: such a read is refused here.
+// into a buffer of another size, and compares afterwards: such a read is refused here. Reading and seeking that the system
+// refuses throw std::ios_base::failure with its error; a stream alone has a code of its own, the same as for a damaged file.
 class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
   public:
     explicit CheckedBuffer(int fd);  // which it closes
@@ -28,6 +29,8 @@ class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
   protected:
     // Throws std::runtime_error where `to` is a block of memory that has no room.
     std::streamsize xsgetn(char* to, std::streamsize size) override;
+    pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode which) override;
+    pos_type seekpos(pos_type position, std::ios_base::openmode which) override;
 
   private:
     std::int64_t negated_ = 0;  // the last number that was read, of 8 bytes, if it was negative

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <stdexcept>
 
 #include <openvdb/openvdb.h>
@@ -168,6 +169,22 @@ void send_metadata(SandboxWriter& writer, const std::optional<VdbMetadata>& meta
     for (const WindLevel& level : metadata->wind) writer.value(level);
 }
 
+// Numbers of a file's metadata come as they are in it: NaN where it is damaged.
+void check_finite(const VdbMetadata& metadata) {
+    const auto check = [](std::initializer_list<double> numbers) {
+        for (const double number : numbers)
+            if (!std::isfinite(number))
+                throw std::runtime_error("it is damaged: its metadata has a number that is not finite");
+    };
+    check({metadata.extinction_per_m, metadata.time_s, metadata.time_step_s, metadata.frames_per_second,
+           metadata.time_scale});
+    const Georeference& place = metadata.georeference;
+    check({place.latitude_deg, place.longitude_deg, place.height_m, place.geoid_height_m, place.heading_deg});
+    check({metadata.period_m.x, metadata.period_m.y, metadata.period_m.z});
+    for (const WindLevel& level : metadata.wind)
+        check({level.height_m, level.velocity.east_m_per_s, level.velocity.north_m_per_s});
+}
+
 std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
     if (reader.value<std::uint8_t>() == 0) return std::nullopt;
     VdbMetadata metadata;
@@ -176,9 +193,6 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
     metadata.time_step_s = reader.value<double>();
     metadata.frames_per_second = reader.value<double>();
     metadata.time_scale = reader.value<double>();
-    if (!std::isfinite(metadata.extinction_per_m + metadata.time_s + metadata.time_step_s +
-                       metadata.frames_per_second + metadata.time_scale))
-        throw std::runtime_error("the reading process sent an impossible number");
     metadata.seed = reader.value<std::uint64_t>();
     metadata.random_stream_version = reader.value<int>();
     for (std::string* text : {&metadata.scene_hash, &metadata.state_hash, &metadata.nephos_version})
@@ -190,9 +204,12 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
         *number = reader.value<double>();
     place.height_datum = reader.value<std::uint8_t>() != 0 ? HeightDatum::ellipsoid : HeightDatum::msl;
     place.start_utc = reader.text();
+    if (!place.start_utc.empty() && !utc_seconds(place.start_utc))
+        throw std::runtime_error("the reading process sent an impossible moment");
     metadata.period_m = reader.value<Vec3>();
     for (auto left = reader.value<std::uint32_t>(); left > 0; --left)
         metadata.wind.push_back(reader.value<WindLevel>());
+    check_finite(metadata);
     return metadata;
 }
 

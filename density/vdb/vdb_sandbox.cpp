@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "density/vdb/vdb_sandbox.h"
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -8,6 +10,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <fcntl.h>
@@ -18,7 +21,6 @@
 #include "core/memory.h"
 #include "core/text.h"
 #include "density/vdb/vdb_archive.h"
-#include "density/vdb/vdb_sandbox.h"
 
 namespace nephos {
 namespace {
@@ -44,6 +46,14 @@ Descriptor opened(const std::filesystem::path& path) {
     if (stream.gcount() != std::streamsize(magic.size()) || magic != kMagic)
         fail(path, "it is not an OpenVDB file");
     return open_regular_file(path, O_RDONLY);
+}
+
+// Why a stream has failed: the system's error, or its own for an end that comes early.
+std::string reason_of(const std::error_code& code) {
+    const bool of_system =
+        code.category() == std::system_category() || code.category() == std::generic_category();
+    return of_system ? std::string("cannot read: ") + std::strerror(code.value())
+                     : "it is truncated or damaged";
 }
 
 }  // namespace
@@ -103,8 +113,8 @@ void in_sandbox(std::span<const std::filesystem::path> paths, const VdbReadLimit
                 if (!by_size) throw;
                 throw std::runtime_error("reading it takes more than " + bytes_text(bounded.memory_bytes) +
                                          " of memory, the most for a file of its size");
-            } catch (const std::ios_base::failure&) {
-                throw std::runtime_error("it is truncated or damaged");
+            } catch (const std::ios_base::failure& error) {
+                throw std::runtime_error(reason_of(error.code()));
             } catch (const openvdb::Exception& error) {
                 throw std::runtime_error(std::string("it is damaged or not supported: ") + error.what());
             }

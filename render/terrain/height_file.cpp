@@ -45,29 +45,34 @@ void require_size(long long columns, long long rows) {
     }
 }
 
-// Reads all of an open file from its beginning; false at an early end or an error.
-bool read_at(int fd, std::uint64_t from, void* to, std::size_t size) {
+constexpr int kEndsEarly = -1;
+
+// Reads `size` bytes of an open file from a place on. Returns 0, kEndsEarly, or errno of the call that failed.
+int read_at(int fd, std::uint64_t from, void* to, std::size_t size) {
     auto* bytes = static_cast<char*>(to);
     while (size > 0) {
         const ssize_t got = ::pread(fd, bytes, size, off_t(from));
         if (got < 0 && errno == EINTR) continue;
-        if (got <= 0) return false;
+        if (got < 0) return errno;
+        if (got == 0) return kEndsEarly;
         bytes += got;
         from += std::uint64_t(got);
         size -= std::size_t(got);
     }
-    return true;
+    return 0;
 }
 
 struct PngSource {
     int fd = -1;
     std::uint64_t at = 0;
+    int failure = 0;  // of read_at()
     char message[200] = {};
 };
 
 void read_png_bytes(png_structp png, png_bytep to, std::size_t size) {
     auto* source = static_cast<PngSource*>(png_get_io_ptr(png));
-    if (!read_at(source->fd, source->at, to, size)) png_error(png, "it ends early");
+    source->failure = read_at(source->fd, source->at, to, size);
+    if (source->failure != 0) png_error(png, "it ends early");
     source->at += size;
 }
 
@@ -122,7 +127,8 @@ bool read_png_rows(PngSource& source, PngHeader& header, std::vector<std::uint16
 }  // namespace
 
 HeightImage parse_height_png(int fd) {
-    PngSource source{fd, 0, {}};
+    PngSource source;
+    source.fd = fd;
     PngHeader header;
     std::vector<std::uint16_t> rows;
     const bool good = read_png_rows(source, header, rows, [&] {
@@ -131,6 +137,8 @@ HeightImage parse_height_png(int fd) {
         if (fits && header.depth == 16 && header.colour == PNG_COLOR_TYPE_GRAY)
             rows.resize(std::size_t(header.width) * header.height);
     });
+    if (source.failure > 0)
+        throw std::runtime_error(std::string("cannot read: ") + std::strerror(source.failure));
     if (!good) throw std::runtime_error(std::string("cannot be read as PNG: ") + source.message);
     require_size(header.width, header.height);
     if (rows.empty()) {
@@ -190,7 +198,9 @@ HeightImage read_raw(const std::filesystem::path& path, int columns, int rows) {
                        ", " + size_text(columns, rows) + " numbers of 16 bits");
     }
     std::vector<std::uint8_t> bytes(expected);
-    if (!read_at(opened.get(), 0, bytes.data(), bytes.size())) fail(path, "cannot be read to its end");
+    const int failure = read_at(opened.get(), 0, bytes.data(), bytes.size());
+    if (failure > 0) throw ReadFailure(path, std::strerror(failure));
+    if (failure != 0) fail(path, "ends early");
     HeightImage image{columns, rows, {}};
     image.heights.reserve(bytes.size() / 2);
     for (std::size_t n = 0; n < bytes.size(); n += 2)

@@ -109,7 +109,50 @@ TEST(Sandbox, EndsWhatRunsTooLong) {
     EXPECT_LT(std::chrono::duration<double>(elapsed).count(), 5.0);
 }
 
+// A child that has told its result, or why there is none, need not end by itself.
+TEST(Sandbox, EndsWhatStaysAfterItsResult) {
+    const auto start = std::chrono::steady_clock::now();
+    SandboxLimits limits;
+    limits.seconds = 60;
+    const auto finished = [](SandboxWriter& writer) {
+        writer.value(1);
+        writer.finish();
+        for (;;) ::pause();
+    };
+    EXPECT_EQ(error_of(finished, limits), "");
+    const auto failed = [](SandboxWriter& writer) {
+        writer.fail("no such grid");
+        for (;;) ::pause();
+    };
+    EXPECT_EQ(error_of(failed, limits), "subject.vdb: no such grid");
+    limits.seconds = 0.3;
+    const auto closed = [](SandboxWriter&) {
+        for (int fd = STDERR_FILENO + 1; fd < 1024; ++fd) ::close(fd);
+        for (;;) ::pause();
+    };
+    EXPECT_EQ(error_of(closed, limits), "subject.vdb: reading it takes longer than allowed");
+    const auto elapsed = std::chrono::steady_clock::now() - start;
+    EXPECT_LT(std::chrono::duration<double>(elapsed).count(), 10.0);
+}
+
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+// The limit of processor time comes before that of the clock where threads work side by side: its signal tells so, and a
+// process that the system kills would be one that is short of memory.
+TEST(Sandbox, EndsWhatComputesTooLong) {
+    SandboxLimits limits;
+    limits.seconds = 0.99;
+    const auto busy = [](SandboxWriter&) {
+        const auto compute = [] {
+            volatile bool forever = true;
+            while (forever) {
+            }
+        };
+        for (int n = 0; n < 4; ++n) std::thread(compute).detach();
+        compute();
+    };
+    EXPECT_EQ(error_of(busy, limits), "subject.vdb: reading it takes longer than allowed");
+}
+
 TEST(Sandbox, EndsWhatTakesTooMuchMemory) {
     SandboxLimits limits;
     limits.memory_bytes = std::size_t{256} << 20;
@@ -186,20 +229,37 @@ TEST(Sandbox, ForbidsEverythingButReading) {
 #endif
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-// fork() copies private memory alone.
+// fork() copies private memory alone. Neither other rights nor advice may lead the child back to what is shared.
 TEST(Sandbox, CannotWriteWhatIsShared) {
-    auto* const page = static_cast<char*>(
-        ::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
-    ASSERT_NE(page, MAP_FAILED);
-    *page = 'a';
-    const std::string message = error_of([page](SandboxWriter& writer) {
-        *static_cast<volatile char*>(page) = 'b';
-        writer.value(1);
-    });
-    EXPECT_NE(message.find("signal 11"), std::string::npos) << message;
-    EXPECT_EQ(*page, 'a');
-    *page = 'c';
-    ::munmap(page, 4096);
+    constexpr std::size_t kSize = 4096;
+    for (const int rights : {PROT_READ | PROT_WRITE, PROT_READ, PROT_NONE}) {
+        auto* const page = static_cast<char*>(
+            ::mmap(nullptr, kSize, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+        ASSERT_NE(page, MAP_FAILED);
+        *page = 'a';
+        ASSERT_EQ(::mprotect(page, kSize, rights), 0);
+        const std::string plain = error_of([page](SandboxWriter& writer) {
+            *static_cast<volatile char*>(page) = 'b';
+            writer.value(1);
+        });
+        EXPECT_NE(plain.find("signal 11"), std::string::npos) << plain;
+        const std::string cunning = error_of([page](SandboxWriter& writer) {
+            const bool refused = ::madvise(page, kSize, MADV_REMOVE) != 0 && errno == EPERM;
+            ::mprotect(page, kSize, PROT_READ | PROT_WRITE);
+            if (*static_cast<volatile char*>(page) == 'a')
+                throw std::runtime_error("what is shared can be read");
+            *static_cast<volatile char*>(page) = 'b';
+            ::madvise(page, kSize, MADV_REMOVE);
+            ::madvise(page, kSize, MADV_DONTNEED);
+            if (!refused) throw std::runtime_error("memory can be removed");
+            writer.value(1);
+        });
+        EXPECT_EQ(cunning, "");
+        ASSERT_EQ(::mprotect(page, kSize, PROT_READ | PROT_WRITE), 0);
+        EXPECT_EQ(*page, 'a');
+        *page = 'c';
+        ::munmap(page, kSize);
+    }
 }
 #endif
 

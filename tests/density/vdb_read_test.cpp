@@ -15,6 +15,7 @@
 
 #include "core/error.h"
 #include "density/smoothing.h"
+#include "density/vdb/block_stream.h"
 #include "density/vdb/vdb_file.h"
 #include "tests/density/naive_smoothing.h"
 #include "tests/density/vdb_test_files.h"
@@ -418,6 +419,56 @@ TEST(VdbRead, DamagedFilesNeverTakeTheProcessDown) {
         EXPECT_LT(message.size(), 600u);
     }
     EXPECT_GT(errors, 20);
+}
+
+// Numbers that are none would go on into the wind and the place of what is rendered.
+TEST(VdbRead, MetadataThatIsNotFiniteIsDamage) {
+    const TemporaryFolder folder;
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN(),
+                     kInfinite = std::numeric_limits<double>::infinity();
+    const auto message_with = [&](const char* name, const openvdb::Metadata& value) {
+        const auto grid = foreign_fog();
+        grid->insertMeta("nephos_version", openvdb::StringMetadata("1"));
+        grid->insertMeta("nephos_latitude_deg", openvdb::DoubleMetadata(50));
+        grid->insertMeta(name, value);
+        write_with_openvdb(folder / "metadata.vdb", {grid});
+        return error_of(folder / "metadata.vdb");
+    };
+    EXPECT_EQ(message_with("nephos_heading_deg", openvdb::DoubleMetadata(90)), "");
+    constexpr const char* kSays = "it is damaged: its metadata has a number that is not finite";
+    for (const char* name :
+         {"nephos_time_s", "nephos_latitude_deg", "nephos_longitude_deg", "nephos_height_m"})
+        for (const double number : {kNone, kInfinite}) {
+            const std::string message = message_with(name, openvdb::DoubleMetadata(number));
+            EXPECT_NE(message.find(kSays), std::string::npos) << message;
+        }
+    const std::string message = message_with("nephos_period_m", openvdb::Vec3DMetadata({0, kNone, 0}));
+    EXPECT_NE(message.find(kSays), std::string::npos) << message;
+}
+
+// Tiles of 17 bytes, each alone in 4096 x 4096 x 4096 voxels, make a tree of 300 KB each; side by side they make one node.
+TEST(VdbRead, ScatteredTilesTakeBoundedMemory) {
+    const auto message_at = [](std::size_t shift) {
+        constexpr SandboxLimits kLimits{.seconds = 60, .memory_bytes = 64u << 20, .most_bytes = 64u << 20};
+        const Extent extent{1 << 19, 1 << 19, 1 << 19};
+        try {
+            run_sandboxed(
+                "subject", "OpenVDB", kLimits, {},
+                [&](SandboxWriter& writer) {
+                    for (int n = 0; n < 16 * 16 * 16; ++n)
+                        send_tile(writer, Coord(n >> 8, n >> 4 & 15, n & 15) << shift, 1);
+                    send_end(writer);
+                },
+                [&](SandboxReader& reader) { receive_blocks(reader, extent, {}); });
+        } catch (const Error& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_EQ(message_at(3), "");
+    for (const std::size_t shift : {7, 12})
+        EXPECT_EQ(message_at(shift),
+                  "subject: reading it takes more than the 64 MiB of memory that are allowed");
 }
 
 // OpenVDB reads as many bytes as the negated size of a chunk says into memory that has no room for them.

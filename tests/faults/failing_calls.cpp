@@ -97,12 +97,34 @@ bool fails(const char* name, std::string_view path, bool* shorten = nullptr) {
     return true;
 }
 
-bool fails(const char* name, int fd, bool* shorten = nullptr) {
-    if (std::strcmp(name, the_plan.name) != 0) return false;
-    char link[64], path[4096];
+// A confined process can ask for no path, and open nothing either: what FAIL_PATH allows among the files that were open when
+// it began. Written after fork() by its only thread.
+constexpr int kFiles = 1024;
+bool allowed_at_fork[kFiles];
+
+// Returns the path of what is open; "" when it is not open or the process is confined.
+std::string_view path_of(int fd, char (&path)[4096]) {
+    char link[64];
     std::snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
     const ssize_t size = ::readlink(link, path, sizeof path);
-    return fails(name, std::string_view(path, size > 0 ? std::size_t(size) : 0), shorten);
+    return {path, size > 0 ? std::size_t(size) : 0};
+}
+
+void remember_files() {
+    if (the_plan.path == nullptr) return;
+    char path[4096];
+    for (int fd = 0; fd < kFiles; ++fd)
+        allowed_at_fork[fd] = path_of(fd, path).find(the_plan.path) != std::string_view::npos;
+}
+
+bool fails(const char* name, int fd, bool* shorten = nullptr) {
+    if (std::strcmp(name, the_plan.name) != 0) return false;
+    const int before = errno;
+    char text[4096];
+    std::string_view path = path_of(fd, text);
+    if (path.empty() && fd >= 0 && fd < kFiles && allowed_at_fork[fd]) path = the_plan.path;
+    errno = before;
+    return fails(name, path, shorten);
 }
 
 // Of a file by its name in a folder that is open.
@@ -165,6 +187,11 @@ int __libc_start_main(int (*main)(int, char**, char**), int argc, char** argv, v
     return next(&__libc_start_main, "__libc_start_main")(main, argc, argv, init, fini, rtld_fini, stack_end);
 }
 
+pid_t fork() noexcept {
+    const pid_t child = next(&fork, "fork")();
+    if (child == 0) remember_files();
+    return child;
+}
 OPEN(open)
 OPEN(open64)
 OPENAT(openat)
