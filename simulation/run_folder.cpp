@@ -419,15 +419,17 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         settings.resume ? find_resumption(settings, folder) : Resumption::nothing_there;
     if (resumption == Resumption::complete) return report_of_complete(settings, folder);
     settings.resume = resumption == Resumption::go_on;
-    Recorder recorder(settings);  // opens the device
+    std::optional<Simulation> made;  // outlives the recorder, whose threads draw what is in it
+    Recorder recorder(settings);     // opens the device
 
     const FolderLock lock(folder.folder, "run");
     if (resumption == Resumption::nothing_there && !settings.overwrite) refuse_to_lose(folder, settings);
     if (lock.held()) remove_leftovers(folder);
-    Simulation simulation = settings.resume   ? resumed_simulation(settings, folder)
-                            : settings.branch ? branched_simulation(settings, folder)
-                                              : Simulation(settings.scene, settings.range, settings.simulation_hash,
-                                             std::move(settings.initial), settings.results());
+    Simulation& simulation =
+        made.emplace(settings.resume   ? resumed_simulation(settings, folder)
+                     : settings.branch ? branched_simulation(settings, folder)
+                                       : Simulation(settings.scene, settings.range, settings.simulation_hash,
+                                                    std::move(settings.initial), settings.results()));
     const std::uint64_t first_step = simulation.steps_taken();
     if (settings.resume) {
         recorder.take_over(simulation);

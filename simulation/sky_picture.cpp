@@ -197,7 +197,7 @@ std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyC
                                   const RenderOptions& options, const std::optional<Flash>& flash,
                                   DrawnClouds& out, bool cull, const std::optional<Camera>& mirrored,
                                   const std::optional<FilmFrame>& film, std::optional<double> at_s) {
-    const double time_s = at_s.value_or(sky.time_s()), state = sky.state_at(time_s);
+    const double time_s = at_s ? *at_s : sky.time_s(), state = sky.state_at(time_s);
     std::vector<FormedCloud> formed;
     for (const SkyCloud& cloud : clouds)
         for (const CloudForm& form : sky.forms(cloud, state)) formed.push_back({&cloud, form});

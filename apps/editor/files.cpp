@@ -181,9 +181,12 @@ void file_preview(Editor& editor, const fs::path& path) {
     if (is_ready()) editor.preview = editor.coming_preview.get();
     FilePreview& shown = editor.preview;
     if (shown.path != path || shown.time != time) {
-        if (!editor.coming_preview.valid())
-            editor.coming_preview =
-                std::async(std::launch::async, [path, time] { return preview_of(path, time); });
+        if (!editor.coming_preview.valid()) {
+            attempt(editor, [&] {
+                editor.coming_preview =
+                    std::async(std::launch::async, [path, time] { return preview_of(path, time); });
+            });
+        }
         return ImGui::TextDisabled("reading...");
     }
     if (!shown.pixels.empty()) draw_thumbnail(shown);

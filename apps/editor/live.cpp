@@ -183,7 +183,7 @@ void LiveScene::run(bool running) {
 
 void LiveScene::set_speed(double steps_per_second) {
     const std::scoped_lock lock(mutex_);
-    steps_per_second_ = steps_per_second;
+    if (std::exchange(steps_per_second_, steps_per_second) == steps_per_second) return;
     simulation_due_.notify_all();
 }
 
@@ -258,7 +258,7 @@ void LiveScene::forget_simulation() {
 void LiveScene::simulate() {
     yield_to_window(kNicer);
     std::unique_lock lock(mutex_);
-    Clock::time_point next_step = Clock::now();
+    Clock::time_point last_step = Clock::now();  // when it was due
     while (true) {
         const auto has_work = [this] {
             return ended_ || hold_ || new_scene_ || clear_ || thins_ ||
@@ -283,6 +283,9 @@ void LiveScene::simulate() {
             is_held_ = false;
             continue;
         }
+        const auto pause = std::chrono::duration_cast<Clock::duration>(
+            std::chrono::duration<double>(1 / std::max(steps_per_second_, 0.01)));
+        const Clock::time_point next_step = last_step + pause;
         try {
             if (new_scene_) {
                 take_scene(lock);
@@ -290,13 +293,11 @@ void LiveScene::simulate() {
                 thin_checkpoints();
             } else if (goal_ != status_.step || !frame_) {
                 advance(lock, goal_);
-                next_step = Clock::now();
+                last_step = Clock::now() - pause;
             } else if (Clock::now() < next_step) {
                 simulation_due_.wait_until(lock, next_step);
             } else {
-                const auto pause = std::chrono::duration<double>(1 / std::max(steps_per_second_, 0.01));
-                next_step += std::chrono::duration_cast<Clock::duration>(pause);
-                next_step = std::max(next_step, Clock::now() - std::chrono::milliseconds(100));
+                last_step = std::max(next_step, Clock::now() - std::chrono::milliseconds(100));
                 goal_ = status_.step + 1;
                 advance(lock, goal_);
             }

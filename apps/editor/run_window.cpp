@@ -66,7 +66,7 @@ void run_window(Editor& editor) {
             ImGui::TextWrapped("The scene has problems: they come first.");
         } else if (!editor.run) {
             ImGui::Text("into out/%s", editor.shown_scene->name.c_str());
-            if (button(editor, "Start the run")) start_run(editor);
+            if (button(editor, "Start the run")) attempt(editor, [&] { start_run(editor); });
         } else {
             const std::scoped_lock lock(editor.run->mutex);
             ImGui::ProgressBar(

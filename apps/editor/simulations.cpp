@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <future>
+#include <system_error>
 #include <utility>
 
 #include <imgui.h>
@@ -175,8 +176,11 @@ void close_scene(Editor& editor) {
     if (editor.scenes.size() < 2) return;
     editor.document->remove_autosave();
     // Its threads may be in the middle of a step: they end beside the window.
-    editor.closing.push_back(
-        std::async(std::launch::async, [live = std::move(editor.live)]() mutable { live.reset(); }));
+    try {
+        editor.closing.push_back(
+            std::async(std::launch::async, [live = std::move(editor.live)]() mutable { live.reset(); }));
+    } catch (const std::system_error&) {  // no thread is to be had: they have ended here
+    }
     std::erase_if(editor.closing, [](const std::future<void>& one) {
         return one.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
     });

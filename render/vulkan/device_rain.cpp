@@ -366,8 +366,13 @@ void DeviceRain::complete(Slot& slot) {
 }
 
 void DeviceRain::finish(const Picture& picture) {
-    for (const std::unique_ptr<Slot>& slot : slots_)
-        if (slot->picture == &picture) complete(*slot);
+    try {
+        for (const std::unique_ptr<Slot>& slot : slots_)
+            if (slot->picture == &picture) complete(*slot);
+    } catch (...) {
+        abandon(picture);  // its strips are no longer anybody's
+        throw;
+    }
 }
 
 void DeviceRain::flush() {

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/error.h"
 #include "scenes/format/reader.h"
 #include "simulation/run_folder.h"
 #include "tests/simulation/file_content.h"
@@ -106,6 +107,28 @@ TEST_F(LightInTurn, AnInterruptionLeavesNoTrace) {
     EXPECT_GE(interruptions, 2);
     for (int frame = 1; frame <= kFrames; ++frame)
         EXPECT_EQ(content(picture(stopped, frame)), content(picture(whole, frame))) << frame;
+}
+
+// The thread that draws is in the middle of a picture, and what it draws stays until it is done (seen by AddressSanitizer).
+TEST_F(LightInTurn, AFolderThatGoesWhileCloudsAreDrawnEndsTheRun) {
+    std::string many = kScene;  // clouds, which are gathered and lit before a picture is drawn
+    many.replace(many.find("clouds = 20"), 11, "clouds = 600");
+    many.replace(many.find("width = 160"), 11, "width = 320");
+    for (const int last : {1, 2, 3}) {
+        RunSettings gone = settings_of(read_scene_text(many, "many.toml"), "gone" + std::to_string(last));
+        const auto rename = [&](const RunProgress& progress) {
+            if (progress.frames == last && fs::exists(gone.folder))
+                fs::rename(gone.folder, gone.folder.string() + " elsewhere");
+        };
+        try {
+            run_scene(gone, {rename, {}});
+            ADD_FAILURE() << "ended as if nothing had happened";
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::io);
+            EXPECT_NE(std::string(error.what()).find("the folder was removed or renamed"), std::string::npos)
+                << error.what();
+        }
+    }
 }
 
 }  // namespace

@@ -117,5 +117,34 @@ TEST_F(LostPictures, OfRainThatMemoryRunsOutForLeaveNoTrace) {
     EXPECT_EQ(draw(drawing, tall).beauty, draw(other, tall).beauty);
 }
 
+// A wait for rain, here over a picture of three strips, that fails ends its picture: the next takes its place, and nothing is
+// written into the one that is gone (seen by AddressSanitizer).
+TEST_F(LostPictures, OfRainAreNotWrittenToLater) {
+    const RenderOptions options = test::rain_view({100, 380, 3}, {100, 480, 13}, 8, 8200, 300);
+    Weather weather;
+    weather.curtains = {test::rain_area()};
+    const auto draw = [&](Renderer& drawing) {
+        return drawing.draw_splats({}, options, {}, Rainfall{options, weather, 3});
+    };
+    Renderer drawing = renderer();
+    const Picture expected = draw(drawing);
+    for (int waits = 0;; ++waits) {
+        ASSERT_LT(waits, 20);
+        bool is_lost = false;
+        try {
+            const test::ScopedVariable lost(kWaits, std::to_string(waits));
+            draw(drawing);
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::gpu) << error.what();
+            is_lost = true;
+        }
+        EXPECT_EQ(draw(drawing).beauty, expected.beauty) << waits;
+        if (!is_lost) {
+            EXPECT_GT(waits, 0) << "no wait was lost: the test proves nothing";
+            break;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace nephos
