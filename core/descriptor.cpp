@@ -19,6 +19,8 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags) {
     struct stat status {};
     if (descriptor.get() < 0 && errno != ENXIO) {
         const int error = errno;
+        if (error == ELOOP && (flags & O_NOFOLLOW) != 0)
+            throw Error(ErrorCode::io, path.string() + ": is a link, which is not followed here");
         throw Error(ErrorCode::io, path.string() + ": cannot open: " + std::strerror(error));
     }
     if (descriptor.get() >= 0 && ::fstat(descriptor.get(), &status) != 0) {

@@ -422,6 +422,12 @@ std::vector<std::byte> SkySimulation::bytes_without_slots() const {
     return out.take();
 }
 
+bool SkySimulation::is_possible(const SkyCloud& c) const {
+    return c.shape < shapes_.size() && c.sky < options_.skies.size() &&
+           std::abs(metres(c.place.x)) < kMaxPlace && std::abs(metres(c.place.y)) < kMaxPlace &&
+           std::isfinite(c.base_m) && c.phase >= 0 && c.phase <= 1;
+}
+
 void SkySimulation::restore(std::span<const std::byte> bytes) {
     const auto bad = [](const char* what) { throw Error(ErrorCode::io, std::string("saved sky: ") + what); };
     ByteReader in(bytes);
@@ -441,12 +447,7 @@ void SkySimulation::restore(std::span<const std::byte> bytes) {
         c.base_m = in.get<double>();
         c.phase = in.get<double>();
         const auto dissolving = in.get<std::uint8_t>();
-        const bool places =
-            std::abs(metres(c.place.x)) < kMaxPlace && std::abs(metres(c.place.y)) < kMaxPlace;
-        if (c.serial >= born || c.shape >= shapes_.size() || c.sky >= options_.skies.size() || !places ||
-            !std::isfinite(c.base_m) || !(c.phase >= 0 && c.phase <= 1) || dissolving > 1) {
-            bad("a cloud of it is impossible");
-        }
+        if (c.serial >= born || !is_possible(c) || dissolving > 1) bad("a cloud of it is impossible");
         c.dissolving = dissolving != 0;
         clouds.push_back(c);
     }

@@ -132,6 +132,9 @@ class SkySimulation {
     // Returns the hash of the state without the slots: of everything that determines later clouds.
     StateHash hash() const;
 
+    // Returns whether a cloud can be one of this sky, whatever its serial and slot.
+    bool is_possible(const SkyCloud& cloud) const;
+
     // Serialise and restore the complete state. restore() throws Error(io) on bytes that no simulation with
     // these options wrote, and then leaves the simulation unchanged.
     std::vector<std::byte> save() const;

@@ -6,6 +6,7 @@
 //
 //     cloud/export.json: `sequences[0].layout.factor` is "two": expected a whole number from 1 to 1048576
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -46,7 +47,18 @@ class CheckedJson {
     std::string place_;  // "sequences[0].layout"; empty: all of the file
 };
 
-// Parses a file. Throws Error(io) naming it, with the line where it is no JSON.
-nlohmann::ordered_json parsed_json(const std::filesystem::path& file);
+enum class JsonLists { kept, left_out };  // null stands where one was left out
+
+// Parses a text as nlohmann::ordered_json::parse() does, which for an object takes time with the square of its keys: here it
+// is linear. Returns a discarded value where the text is no JSON, and in `error` how many bytes were read up to there, or 0
+// where more than 64 objects and lists lie in each other.
+nlohmann::ordered_json parsed_json_text(std::string_view text, JsonLists lists = JsonLists::kept,
+                                        std::size_t* error = nullptr);
+
+// Parses a file as parsed_json_text(). Throws Error(io) naming it, with the line where it is no JSON.
+nlohmann::ordered_json parsed_json(const std::filesystem::path& file, JsonLists lists = JsonLists::kept);
+
+// Of several members with one key keeps the last value, at the place of the first; linear. For members that were appended.
+void merge_doubles(nlohmann::ordered_json::object_t& members);
 
 }  // namespace nephos

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <system_error>
+#include <unordered_map>
 #include <vector>
 
 #include <fmt/format.h>
@@ -100,23 +101,22 @@ std::string range_text(const EarlierRun& run) {
 std::string changed_keys(const EarlierRun& earlier, const RunSettings& settings) {
     std::vector<std::string> keys;
     // Manifests of earlier versions have only the keys that were not at their defaults.
-    const Parameters defaults = parameters(Scene{});
-    const auto value_in = [&](const Parameters& parameters, const std::string& key) -> std::string {
-        for (const Parameters* list : {&parameters, &defaults}) {
-            const auto found = std::ranges::find(*list, key, &Parameters::value_type::first);
-            if (found != list->end()) return found->second;
-        }
+    const Parameters list_now = parameters(settings.scene), list_default = parameters(Scene{});
+    using Values = std::unordered_map<std::string, std::string>;
+    const Values then(earlier.parameters.begin(), earlier.parameters.end()),
+        now(list_now.begin(), list_now.end()), defaults(list_default.begin(), list_default.end());
+    const auto value_in = [&](const Values& values, const std::string& key) -> std::string {
+        for (const Values* list : {&values, &defaults})
+            if (const auto found = list->find(key); found != list->end()) return found->second;
         return "not there";
     };
-    const Parameters now = parameters(settings.scene);
-    for (const Parameters* list : {&earlier.parameters, &now}) {
-        for (const auto& [key, value] : *list) {
-            const std::string was = value_in(earlier.parameters, key), is = value_in(now, key);
-            if (was == is) continue;
-            std::string text = fmt::format("`{}` was {}, now {}", key, was, is);
-            if (std::ranges::count(keys, text) == 0) keys.push_back(std::move(text));
-        }
-    }
+    const auto compare = [&](const std::string& key) {
+        const std::string was = value_in(then, key), is = value_in(now, key);
+        if (was != is) keys.push_back(fmt::format("`{}` was {}, now {}", key, was, is));
+    };
+    for (const auto& [key, value] : earlier.parameters) compare(key);
+    for (const auto& [key, value] : list_now)
+        if (!then.contains(key)) compare(key);
     if (keys.empty()) return "the initial state differs";
     const std::size_t more = keys.size() > 3 ? keys.size() - 3 : 0;
     keys.resize(keys.size() - more);

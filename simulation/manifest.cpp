@@ -3,19 +3,19 @@
 
 #include <array>
 #include <charconv>
-#include <fstream>
 #include <string_view>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
-#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/math.h"
 #include "core/random.h"
 #include "density/combine.h"
+#include "scenes/format/text.h"
 #include "scenes/format/writer.h"
+#include "simulation/checked_json.h"
 #include "simulation/scene_place.h"
 #include "simulation/simulation.h"
 
@@ -44,12 +44,13 @@ Json rain_json(const RainRecord& area) {
             {"intensity_mm_per_h", area.intensity_mm_per_h}};
 }
 
-RainRecord rain_record(const Json& json) {
+RainRecord rain_record(const Json& json, const std::filesystem::path& manifest) {
     RainRecord area;
     const auto id = json.at("id").get<std::string>();
     const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), area.id, 16);
     if (error != std::errc() || end != id.data() + id.size())
-        throw Error(ErrorCode::io, "'" + id + "' is not the number of a rain area");
+        throw Error(ErrorCode::io,
+                    manifest.string() + ": '" + shortened(id) + "' is not the number of a rain area");
     area.layer = json.at("layer").get<std::string>();
     area.x_m = json.at("centre_m").at(0).get<double>();
     area.y_m = json.at("centre_m").at(1).get<double>();
@@ -208,8 +209,8 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
     if (scene.georeference.given) json["georeference"] = place_json(scene.georeference);
     json["wind"] = wind_json(scene.automaton.wind);
     if (!scene.layers.empty()) json["layers"] = layers_json(settings, folder);
-    Json keys = Json::object();
-    for (const auto& [key, value] : parameters(scene)) keys[key] = value;
+    Json::object_t keys;  // appended to: a key of an object is looked for among all of its keys
+    for (const auto& [key, value] : parameters(scene)) keys.emplace_back(key, value);
     json["parameters"] = std::move(keys);
     json["files"] = {{"statistics", relative(settings, folder.statistics())}};
     if (settings.checkpoint || !state.complete)
@@ -230,8 +231,26 @@ std::string members(const Json& object) {
 
 }  // namespace
 
-FileRecord file_record(const Json& json) {
-    return {json.at("path").get<std::string>(),
+bool is_inside_folder(const std::filesystem::path& path) {
+    return !path.empty() && path.is_relative() && path.lexically_normal() == path && *path.begin() != "..";
+}
+
+int frame_number(const Json& json, const std::filesystem::path& manifest) {
+    if (!json.is_number()) return json.get<int>();  // throws
+    const bool is_whole =
+        json.is_number_integer() && (!json.is_number_unsigned() || json.get<std::uint64_t>() <= kMaxFrames);
+    if (is_whole && json.get<std::int64_t>() >= -1 && json.get<std::int64_t>() <= kMaxFrames)
+        return json.get<int>();
+    throw Error(ErrorCode::io,
+                fmt::format("{}: the frame's number {} is impossible", manifest.string(), json.dump()));
+}
+
+FileRecord file_record(const Json& json, const std::filesystem::path& manifest) {
+    const std::filesystem::path path = json.at("path").get<std::string>();
+    if (!is_inside_folder(path))
+        throw Error(ErrorCode::io, fmt::format("{}: lists the file \"{}\", which is none of its folder",
+                                               manifest.string(), shortened(path.string())));
+    return {path.string(),
             {json.at("bytes").get<std::uint64_t>(), json.at("xxh3").get<std::string>()},
             json.value("voxels_xxh3", std::string())};
 }
@@ -272,14 +291,9 @@ namespace {
 // Calls `read` with the manifest as a whole. Throws Error(io) naming it.
 template <class Read>
 auto with_manifest(const std::filesystem::path& path, const Read& read) {
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
+    const Json json = parsed_json(path);
     try {
-        return read(Json::parse(stream));
-    } catch (const Error& error) {
-        throw Error(ErrorCode::io, path.string() + ": " + error.what());
-    } catch (const std::ios_base::failure& failure) {
-        throw ReadFailure(path, failure.code().message());
+        return read(json);
     } catch (const nlohmann::json::exception&) {
         throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
     }
@@ -288,12 +302,12 @@ auto with_manifest(const std::filesystem::path& path, const Read& read) {
 }  // namespace
 
 std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& path) {
-    return with_manifest(path, [](const Json& json) {
+    return with_manifest(path, [&](const Json& json) {
         std::map<int, std::vector<RainRecord>> rain;
         for (const Json& frame : json.at("frames")) {
             if (!frame.contains("rain")) continue;
-            std::vector<RainRecord>& areas = rain[frame.at("number").get<int>()];
-            for (const Json& area : frame.at("rain")) areas.push_back(rain_record(area));
+            std::vector<RainRecord>& areas = rain[frame_number(frame.at("number"), path)];
+            for (const Json& area : frame.at("rain")) areas.push_back(rain_record(area, path));
         }
         return rain;
     });
@@ -304,25 +318,21 @@ std::string read_scene_text_of(const std::filesystem::path& path) {
 }
 
 std::map<int, std::vector<FileRecord>> read_frame_files(const std::filesystem::path& path) {
-    return with_manifest(path, [](const Json& json) {
+    return with_manifest(path, [&](const Json& json) {
         std::map<int, std::vector<FileRecord>> files;
         for (const Json& frame : json.at("frames")) {
             if (!frame.contains("files")) continue;
-            std::vector<FileRecord>& records = files[frame.at("number").get<int>()];
-            for (const Json& file : frame.at("files")) records.push_back(file_record(file));
+            std::vector<FileRecord>& records = files[frame_number(frame.at("number"), path)];
+            for (const Json& file : frame.at("files")) records.push_back(file_record(file, path));
         }
         return files;
     });
 }
 
 EarlierRun read_manifest(const std::filesystem::path& path) {
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
+    // Lists are not needed here, and that of the frames may be very long.
+    const Json json = parsed_json(path, JsonLists::left_out);
     try {
-        // The frames are not needed here, and may be very many.
-        const Json json = Json::parse(stream, [](int depth, Json::parse_event_t event, const Json& parsed) {
-            return !(depth == 1 && event == Json::parse_event_t::key && parsed == "frames");
-        });
         if (json.at("format") != "nephos run" || json.at("format_version") != kFormatVersion) {
             throw Error(ErrorCode::io, path.string() + ": is not a manifest of this version of nephos");
         }
@@ -336,16 +346,14 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
         run.range.last_step = json.at("range").at("last_step").get<std::uint64_t>();
         // Manifests of earlier versions do not name the scene's steps; without --frames they are the last step.
         run.scene_steps = json.at("scene").value("steps", run.range.last_step);
-        run.range.first_frame = json.at("range").at("first_frame").get<int>();
-        run.range.last_frame = json.at("range").at("last_frame").get<int>();
+        run.range.first_frame = frame_number(json.at("range").at("first_frame"), path);
+        run.range.last_frame = frame_number(json.at("range").at("last_frame"), path);
         run.steps_reported = json.at("steps").at("reported").get<std::uint64_t>();
         if (json.contains("parameters")) {
             for (const auto& [key, value] : json.at("parameters").items())
                 run.parameters.emplace_back(key, value.get<std::string>());
         }
         return run;
-    } catch (const std::ios_base::failure& failure) {
-        throw ReadFailure(path, failure.code().message());
     } catch (const nlohmann::json::exception&) {
         throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
     }

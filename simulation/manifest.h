@@ -68,8 +68,13 @@ std::vector<RainRecord> rain_of(const FrameResult& frame);
 // read_manifest().
 std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& path);
 
-// Returns the record of a file as a manifest has it. Throws a JSON exception when it is none.
-FileRecord file_record(const nlohmann::ordered_json& json);
+// Return the record of a file, and the number of a frame, as a manifest has them. Throw Error(io) naming the manifest
+// when the value is impossible, or json::exception when it is of another kind.
+FileRecord file_record(const nlohmann::ordered_json& json, const std::filesystem::path& manifest);
+int frame_number(const nlohmann::ordered_json& json, const std::filesystem::path& manifest);
+
+// Returns whether a path of a list leads to something below the list's folder, without detours.
+bool is_inside_folder(const std::filesystem::path& path);
 
 // Returns the canonical text of the scene of an earlier run. Throws Error(io) as read_manifest().
 std::string read_scene_text_of(const std::filesystem::path& path);

@@ -1,23 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/run_listing.h"
 
-#include <fstream>
 #include <system_error>
 
 #include <nlohmann/json.hpp>
 
-#include "core/descriptor.h"
 #include "core/error.h"
 #include "scenes/format/reader.h"
+#include "simulation/checked_json.h"
 
 namespace nephos {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-ListedFrame frame_of(const Json& json) {
+ListedFrame frame_of(const Json& json, const std::filesystem::path& manifest) {
     ListedFrame frame;
-    frame.number = json.at("number").get<int>();
+    frame.number = frame_number(json.at("number"), manifest);
     frame.time_s = json.at("time_s").get<double>();
     frame.step = json.at("step").get<std::uint64_t>();
     frame.state_hash = json.at("state_hash").get<std::string>();
@@ -43,14 +42,13 @@ RunListing read_run(const std::filesystem::path& folder) {
     run.render = earlier.render;
     run.range = earlier.range;
     std::string text;
+    const Json json = parsed_json(path);
     try {
-        std::ifstream stream(path, std::ios::binary);
-        const Json json = Json::parse(stream);
         run.nephos_version = json.at("nephos_version").get<std::string>();
         text = json.at("scene_text").get<std::string>();
-        for (const Json& frame : json.at("frames")) run.frames.push_back(frame_of(frame));
+        for (const Json& frame : json.at("frames")) run.frames.push_back(frame_of(frame, path));
         if (json.contains("run_files"))
-            for (const Json& file : json.at("run_files")) run.run_files.push_back(file_record(file));
+            for (const Json& file : json.at("run_files")) run.run_files.push_back(file_record(file, path));
     } catch (const nlohmann::json::exception&) {
         throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
     }

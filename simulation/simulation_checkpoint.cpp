@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <span>
 
 #include <malloc.h>
 
+#include "automaton/plane_bytes.h"
 #include "core/bytes.h"
 #include "core/error.h"
 #include "simulation/simulation.h"
@@ -16,7 +18,7 @@
 namespace nephos {
 namespace {
 
-constexpr std::uint32_t kHistoryVersion = 4;
+constexpr std::uint32_t kHistoryVersion = 5;
 
 // The range of a simulation, in the order of a checkpoint.
 void put_range(ByteWriter& writer, const SimulationRange& range) {
@@ -70,20 +72,25 @@ std::vector<SkyCloud> get_clouds(ByteReader& reader, const SkySimulation* sky) {
         const auto numbers = reader.get<std::array<std::uint32_t, 5>>();
         const auto place = reader.get<std::array<std::int64_t, 2>>();
         const auto values = reader.get<std::array<double, 2>>();
-        if (sky == nullptr || numbers[1] >= sky->shapes().size() ||
-            numbers[2] >= sky->options().skies.size()) {
+        const SkyCloud& cloud = clouds.emplace_back(SkyCloud{numbers[0],
+                                                             numbers[1],
+                                                             numbers[2],
+                                                             {place[0], place[1]},
+                                                             values[0],
+                                                             values[1],
+                                                             numbers[3] != 0,
+                                                             numbers[4]});
+        if (sky == nullptr || !sky->is_possible(cloud))
             throw Error(ErrorCode::io, "the checkpoint's history is damaged");
-        }
-        clouds.push_back({numbers[0],
-                          numbers[1],
-                          numbers[2],
-                          {place[0], place[1]},
-                          values[0],
-                          values[1],
-                          numbers[3] != 0,
-                          numbers[4]});
     }
     return clouds;
+}
+
+BitPlane get_plane(ByteReader& reader, const Extent& extent) {
+    BitPlane plane(extent);
+    reader.get_bytes(std::as_writable_bytes(plane.words()));
+    require_clear_padding(std::as_bytes(plane.words()), extent);
+    return plane;
 }
 
 void put_rain(ByteWriter& writer, const std::vector<RainArea>& areas) {
@@ -94,7 +101,13 @@ void put_rain(ByteWriter& writer, const std::vector<RainArea>& areas) {
 
 std::vector<RainArea> get_rain(ByteReader& reader) {
     std::vector<RainArea> areas;
-    for (auto left = reader.get<std::uint64_t>(); left > 0; --left) areas.push_back(reader.get<RainArea>());
+    for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+        const RainArea& area = areas.emplace_back(reader.get<RainArea>());
+        const double values[] = {area.x_m,    area.y_m,    area.semi_a_m,          area.semi_b_m,
+                                 area.axis_x, area.axis_y, area.intensity_mm_per_h};
+        if (!std::ranges::all_of(values, [](double value) { return std::isfinite(value); }))
+            throw Error(ErrorCode::io, "the checkpoint's history is damaged");
+    }
     return areas;
 }
 
@@ -122,12 +135,6 @@ std::vector<std::byte> saved_layers(const std::vector<LayerSimulation>& layers) 
         writer.put_bytes(bytes);
     }
     return writer.take();
-}
-
-BitPlane get_plane(ByteReader& reader, Extent extent) {
-    BitPlane plane(extent);
-    reader.get_bytes(std::as_writable_bytes(plane.words()));
-    return plane;
 }
 
 }  // namespace

@@ -116,8 +116,10 @@ StatisticsFile StatisticsFile::create(const std::filesystem::path& path, std::st
 
 StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::uint64_t steps,
                                       const StatisticsVisitor& visit, std::string_view header) {
+    Descriptor file = open_regular_file(path, O_WRONLY | O_APPEND | O_NOFOLLOW);
     const std::uint64_t size = read_statistics(path, steps, visit, header, kStartAnew);
-    Descriptor file = open_regular_file(path, O_WRONLY | O_APPEND);
+    if (!is_same_file(file.get(), path))  // what is cut is what was read
+        throw Error(ErrorCode::io, path.string() + ": was removed or replaced while it was read");
     if (::ftruncate(file.get(), off_t(size)) != 0) fail(path, errno);
     return StatisticsFile(path, std::move(file), size);
 }

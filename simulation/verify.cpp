@@ -65,12 +65,18 @@ std::vector<std::filesystem::path> extra_files(const RunListing& run, const std:
 
 Check check_numbers(const RunListing& run) {
     Problems problems;
-    int next = run.range.first_frame;
     std::set<int> numbers;
     for (const ListedFrame& frame : run.frames) numbers.insert(frame.number);
     const int last = run.complete ? run.range.last_frame : (numbers.empty() ? 0 : *numbers.rbegin());
-    for (; next <= last; ++next)
-        if (!numbers.contains(next)) problems.add(fmt::format("frame {} is missing", next));
+    int next = run.range.first_frame;
+    const auto expect = [&](int number) {  // all from the next to the one before it are missing
+        if (number == next + 1) problems.add(fmt::format("frame {} is missing", next));
+        if (number > next + 1) problems.add(fmt::format("frames {} to {} are missing", next, number - 1));
+        next = std::max(next, number + 1);
+    };
+    for (const int number : numbers)
+        if (number <= last) expect(number);
+    expect(last + 1);
     if (!run.complete)
         problems.add(fmt::format("the run is not complete: {} frames are done", numbers.size()));
     return problems.check(

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -326,6 +327,33 @@ std::vector<ConnectedCloud> clouds_of_shadow(const BitPlaneView& cld, const Boun
 std::vector<ConnectedCloud> clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries,
                                       Neighbours neighbours) {
     return clouds_of_shadow(cld, boundaries, neighbours, true);
+}
+
+std::uint64_t count_shadow_runs(const BitPlaneView& cld) {
+    const BitPlane shadow = shadow_of(cld);
+    const BitPlaneView plane = shadow.view();
+    std::uint64_t runs = 0;
+    for (int j = 0; j < plane.extent.y; ++j) {
+        const std::uint64_t* row = plane.row(j, 0);
+        std::uint64_t carry = 0;  // the last column of the word before
+        for (std::size_t w = 0; w < plane.words_per_row; ++w) {
+            runs += std::uint64_t(std::popcount(row[w] & ~(row[w] << 1 | carry)));
+            carry = row[w] >> 63;
+        }
+    }
+    return runs;
+}
+
+std::size_t clouds_2d_bytes(const Extent& extent, std::uint64_t runs) {
+    // Root, faces and cloud of a run, the run, and what it shares with the row beside it, with room for twice as many; then
+    // those of clouds, of which those of several runs have sums. Less is alive in organisation().
+    constexpr std::size_t kOfRun = 3 * sizeof(std::uint32_t) + sizeof(CellRun) + 2 * sizeof(RunOverlap),
+                          kOfCloud = sizeof(ConnectedCloud) + sizeof(std::uint8_t) +
+                                     2 * sizeof(std::uint32_t) + sizeof(Sums) / 2;
+    // The shadow, its first cells of runs, and the runs before each word.
+    const std::size_t plane = BitPlane::bytes({extent.x, extent.y, 1});
+    return plane * 2 + plane / 2 + std::size_t(extent.y) * sizeof(std::uint32_t) +
+           std::size_t(runs) * (kOfRun + kOfCloud);
 }
 
 std::vector<ConnectedCloud> cloud_sizes_2d(const BitPlaneView& cld, const Boundaries& boundaries) {

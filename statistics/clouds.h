@@ -41,6 +41,12 @@ std::vector<ConnectedCloud> clouds_2d(const BitPlaneView& cld, const Boundaries&
                                       Neighbours neighbours = Neighbours::four);
 std::vector<ConnectedCloud> clouds_3d(const BitPlaneView& cld, const Boundaries& boundaries);
 
+// Returns how many runs of covered columns the shadow has, row by row.
+std::uint64_t count_shadow_runs(const BitPlaneView& cld);
+// Returns how many bytes clouds_2d() needs at most while it works, and organisation() (statistics/organisation.h) of what it
+// returns, for a shadow with that many runs: each may be a cloud of its own.
+std::size_t clouds_2d_bytes(const Extent& extent, std::uint64_t runs);
+
 // Returns the clouds of clouds_2d() with four neighbours, but all centroids 0: sizes and edges take half the time.
 std::vector<ConnectedCloud> cloud_sizes_2d(const BitPlaneView& cld, const Boundaries& boundaries);
 

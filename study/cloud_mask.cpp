@@ -15,6 +15,8 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "density/vdb/mask_file.h"
+#include "scenes/format/text.h"
+#include "simulation/memory.h"
 
 namespace nephos {
 namespace {
@@ -88,8 +90,8 @@ CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions
     CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries, is_flat, 0, {}};
     if (!axes.note.empty()) masks.notes.push_back(axes.note);
     if (axes.downwards)
-        masks.notes.push_back(
-            fmt::format("the levels of the variable {} go downwards, and are turned over", source.name()));
+        masks.notes.push_back(fmt::format("the levels of the variable {} go downwards, and are turned over",
+                                          shortened(source.name())));
     // Row by row: as bits the masks are a small part of their values.
     const double threshold = options.threshold.value_or(0);
     std::vector<double> row(sizes[2]);
@@ -119,14 +121,15 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
     const double size = cell_size(path, options);
     require_no_height(path, options);
     // Deflate makes at most 1,032 bytes of one, and a pixel has at least a bit: a header that claims more lies.
-    constexpr std::uint64_t kMostPixels = std::uint64_t(1) << 30, kPixelsOfByte = 8 * 1040;
+    constexpr std::uint64_t kMostPixels = std::uint64_t(1) << 28, kPixelsOfByte = 8 * 1040;
+    constexpr std::uint64_t kMostBytes = std::uint64_t(1) << 30;
     require_regular_file(path);
     std::error_code error;
     const std::uintmax_t size_of_file = std::filesystem::file_size(path, error);
     if (error) fail(ErrorCode::io, path, error.message());
-    if (size_of_file > kMostPixels)
+    if (size_of_file > kMostBytes)
         fail(ErrorCode::io, path,
-             fmt::format("has {} bytes; at most {} can be read", size_of_file, kMostPixels));
+             fmt::format("has {} bytes; at most {} can be read", size_of_file, kMostBytes));
     const std::string bytes = read_beginning(path, std::size_t(size_of_file));
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
@@ -182,6 +185,18 @@ SeriesMean mean_of(const std::vector<double>& values) {
     const double tau =
         values.size() < kEnough ? 1 : integrated_time(autocorrelation(values, values.size() / 2));
     return {mean, deviation * std::sqrt(tau / n), deviation, tau, n / tau};
+}
+
+// Throws Error(usage) where the clouds of a shadow of so many runs take more memory than there is.
+void require_memory_of_clouds(const Extent& extent, std::uint64_t runs) {
+    require_memory(clouds_2d_bytes(extent, runs),
+                   fmt::format("labelling the clouds of {} x {} columns", extent.x, extent.y));
+}
+
+// Runs of a random shadow: one begins where a covered column follows a clear one, or begins a row. Few have more.
+std::uint64_t runs_of_random_shadow(const Extent& extent, double cover) {
+    const double columns = double(extent.x) * extent.y;
+    return std::uint64_t(columns * cover * (1 - cover) + extent.y * cover * cover + 5 * std::sqrt(columns));
 }
 
 // The mean over the snapshots that have two clouds or more.
@@ -271,6 +286,7 @@ MaskStatistics mask_statistics(const CloudMasks& masks) {
         series[statistic_index(name)].push_back(value);
     };
     for (const BitPlane& plane : masks.snapshots) {
+        require_memory_of_clouds(extent, count_shadow_runs(plane.view()));
         const CloudCounts counts = count_cloud(plane.view(), masks.boundaries);
         const CloudStatistics s = cloud_statistics(counts, levels);
         put("cover", s.cover);
@@ -295,8 +311,9 @@ MaskStatistics mask_statistics(const CloudMasks& masks) {
     for (const std::string_view name : {"size_exponent", "size_exponent_line", "fractal_dimension"})
         result.statistics[statistic_index(name)] = size_statistic(name, sizes);
     result.organisation = sums.mean();
-    result.random = null_organisation(
-        extent, masks.boundaries, result.statistics[statistic_index("cover")].mean, kNullDraws, kNullSeed);
+    const double cover = result.statistics[statistic_index("cover")].mean;
+    require_memory_of_clouds(extent, runs_of_random_shadow(extent, cover));
+    result.random = null_organisation(extent, masks.boundaries, cover, kNullDraws, kNullSeed);
     return result;
 }
 

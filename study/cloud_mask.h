@@ -9,7 +9,7 @@
 //             fastest, as their CF attributes and names tell (cloud_mask_axes.h); levels of a coordinate that tells that they
 //             go downwards are turned over. Several times are several snapshots. Values are unpacked, and missing ones (NaN,
 //             _FillValue, missing_value, outside valid_range) are clear, and counted
-//     .png    grey, seen from above, north up; at most 2^30 pixels
+//     .png    grey, seen from above, north up; at most 2^28 pixels
 //
 // A picture, and a variable without levels or with one whose height is not given, is a view from above: what needs a vertical
 // has no value.
@@ -61,7 +61,7 @@ struct MaskStatistics {
     NullOrganisation random;    // the same of random shadows of the same cover
 };
 
-// Thread-safe. Equal masks give equal values.
+// Thread-safe. Equal masks give equal values. Throws Error(usage) when the clouds take more memory than there is.
 MaskStatistics mask_statistics(const CloudMasks& masks);
 
 }  // namespace nephos

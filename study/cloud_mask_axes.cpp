@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "scenes/format/text.h"
 
 namespace nephos {
 namespace {
@@ -18,6 +19,7 @@ namespace {
 // In the order that a mask has them.
 enum class Kind { time, levels, y, x, unknown };
 constexpr std::array<std::string_view, 4> kKindNames{"time", "z", "y", "x"};
+constexpr std::size_t kMostListed = 20;  // names of dimensions in a message
 
 std::string lower(std::string text) {
     std::ranges::transform(text, text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
@@ -104,7 +106,13 @@ bool is_downwards(const NetcdfAxis& axis) {
 
 std::string names_of(const std::vector<NetcdfAxis>& axes) {
     std::vector<std::string> names;
-    for (const NetcdfAxis& axis : axes) names.push_back(axis.name);
+    for (const NetcdfAxis& axis : axes) {
+        if (names.size() == kMostListed) {
+            names.push_back("...");
+            break;
+        }
+        names.push_back(shortened(axis.name));
+    }
     return fmt::format("{}", fmt::join(names, ", "));
 }
 
@@ -124,7 +132,7 @@ std::string names_of(const std::vector<Kind>& kinds) {
     std::vector<std::string> names;
     bool differ = true;
     for (std::size_t n = 0; n < order.size(); ++n) {
-        names.push_back(axes[order[n]].name);
+        names.push_back(shortened(axes[order[n]].name));
         differ = differ && (n == 0 || kinds[order[n]] != kinds[order[n - 1]]);
     }
     const auto has = [&](Kind kind) { return std::ranges::count(kinds, kind) > 0; };
@@ -135,7 +143,7 @@ std::string names_of(const std::vector<Kind>& kinds) {
     throw Error(ErrorCode::usage,
                 fmt::format("{}: the dimensions ({}) of the variable {} are {}; expected (time,) (z,) y, x, "
                             "the last fastest: {}",
-                            path.string(), names_of(axes), source.name(), names_of(kinds), cure));
+                            path.string(), names_of(axes), shortened(source.name()), names_of(kinds), cure));
 }
 
 }  // namespace
@@ -146,7 +154,7 @@ MaskAxes mask_axes(const std::filesystem::path& path, const NetcdfSource& source
         throw Error(ErrorCode::usage,
                     fmt::format("{}: the variable {} has {} dimensions ({}); expected (y, x), (z, y, x), "
                                 "(time, y, x) or (time, z, y, x)",
-                                path.string(), source.name(), axes.size(), names_of(axes)));
+                                path.string(), shortened(source.name()), axes.size(), names_of(axes)));
     std::vector<Kind> kinds, places{Kind::y, Kind::x};
     for (const NetcdfAxis& axis : axes) kinds.push_back(kind_of(axis));
     if (axes.size() == 4) places = {Kind::time, Kind::levels, Kind::y, Kind::x};
@@ -161,7 +169,7 @@ MaskAxes mask_axes(const std::filesystem::path& path, const NetcdfSource& source
             "the dimensions ({}) of the variable {} are taken as {} by their places: not all of the names "
             "are "
             "known, nor do attributes `axis` tell",
-            names_of(axes), source.name(), names_of(places));
+            names_of(axes), shortened(source.name()), names_of(places));
     return found;
 }
 

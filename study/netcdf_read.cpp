@@ -9,12 +9,14 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <string_view>
 
 #include "study/netcdf_file.h"
 #include <fmt/format.h>
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "scenes/format/text.h"
 #include "simulation/memory.h"
 
 namespace nephos {
@@ -22,6 +24,11 @@ namespace {
 
 // Types of values that are asked for by name.
 constexpr std::uint32_t kCharacters = 2, kFloats = 5, kDoubles = 6;
+
+// Values of an attribute: in memory they take up to 8 bytes for each of the file.
+constexpr std::uint64_t kMostOfAttribute = 10'000;
+constexpr std::uint64_t kMostDimensions = 1024;  // of a variable, as of libnetcdf
+constexpr std::size_t kMostListed = 20;          // names of variables in a message
 
 // A cursor over a file's bytes, big-endian.
 class Reader {
@@ -71,6 +78,7 @@ class Reader {
     }
     std::uint64_t size() const { return bytes_.size(); }
     std::uint64_t at() const { return at_; }
+    void go_to(std::uint64_t at) { at_ = at; }
 
   private:
     std::filesystem::path path_;
@@ -112,30 +120,55 @@ double value_at(const Reader& reader, std::uint64_t at, std::uint32_t type) {
     }
 }
 
-// The values of an attribute as numbers, or its text.
+// The values of an attribute as numbers, or its text: the first kMostOfAttribute.
 struct Attribute {
     std::uint32_t type = 0;
     std::vector<double> values;
     std::string text;
+    std::uint64_t count = 0;  // of all
 };
 using Attributes = std::map<std::string, Attribute>;
 
-Attributes read_attributes(Reader& reader, const std::filesystem::path& path) {
-    Attributes attributes;
+// Calls `read` with the name, the type and the number of values of each attribute of a list, and with their first byte.
+template <class Read>
+void for_each_attribute(Reader& reader, const std::filesystem::path& path, const Read& read) {
     reader.next<std::uint32_t>();
     for (std::uint64_t left = reader.count(); left > 0; --left) {
         const std::string name = reader.name();
-        Attribute& attribute = attributes[name];
-        attribute.type = reader.next<std::uint32_t>();
-        const std::uint64_t count = reader.count(), bytes = size_of_type(attribute.type, path);
+        const auto type = reader.next<std::uint32_t>();
+        const std::uint64_t count = reader.count(), bytes = size_of_type(type, path);
         if (count > reader.size()) throw Error(ErrorCode::io, path.string() + ": ends early");
         const std::uint64_t begin = reader.at();
         reader.skip(count * bytes);
-        for (std::uint64_t n = 0; n < count && attribute.type == kCharacters; ++n)
-            attribute.text.push_back(char(reader.get<std::uint8_t>(begin + n)));
-        for (std::uint64_t n = 0; n < count && attribute.type != kCharacters; ++n)
-            attribute.values.push_back(value_at(reader, begin + n * bytes, attribute.type));
+        read(name, type, count, begin);
     }
+}
+
+void skip_attributes(Reader& reader, const std::filesystem::path& path) {
+    for_each_attribute(reader, path, [](const auto&...) {});
+}
+
+// The attributes that are asked for, of the list at a place of the file.
+Attributes attributes_at(Reader& reader, std::uint64_t at, const std::filesystem::path& path) {
+    constexpr std::string_view kNames[] = {"_FillValue", "_Unsigned",     "missing_value", "valid_min",
+                                           "valid_max",  "valid_range",   "scale_factor",  "add_offset",
+                                           "axis",       "standard_name", "units",         "positive"};
+    Attributes attributes;
+    reader.go_to(at);
+    for_each_attribute(
+        reader, path,
+        [&](const std::string& name, std::uint32_t type, std::uint64_t count, std::uint64_t begin) {
+            if (std::ranges::count(kNames, name) == 0) return;
+            Attribute attribute{type, {}, {}, count};
+            const std::uint64_t bytes = size_of_type(type, path);
+            for (std::uint64_t n = 0; n < std::min(count, kMostOfAttribute); ++n) {
+                if (type == kCharacters)
+                    attribute.text.push_back(char(reader.get<std::uint8_t>(begin + n)));
+                else
+                    attribute.values.push_back(value_at(reader, begin + n * bytes, type));
+            }
+            attributes[name] = std::move(attribute);
+        });
     return attributes;
 }
 
@@ -166,7 +199,8 @@ struct FoundVariable {
     std::vector<std::uint64_t> dimensions;
     std::uint32_t type = 0;
     std::uint64_t begin = 0, bytes = 0;
-    Attributes attributes;
+    std::uint64_t attributes_at = 0;  // byte of the file
+    Attributes attributes;            // of the one that is read
 };
 
 // The value that libnetcdf puts where nothing was written; types of one byte have none.
@@ -206,7 +240,7 @@ void take_as_unsigned(FoundVariable& variable) {
     variable.type = unsigned_type(type);
     if (variable.attributes.find("_FillValue") == variable.attributes.end())
         if (const std::optional<double> usual = default_fill(type))
-            variable.attributes["_FillValue"] = {type, {*usual}, {}};
+            variable.attributes["_FillValue"] = {type, {*usual}, {}, 1};
     // Those that hold packed values; what packs them, scale_factor and add_offset, has a sign of its own.
     for (const char* name : {"_FillValue", "missing_value", "valid_min", "valid_max", "valid_range"}) {
         const auto at = variable.attributes.find(name);
@@ -228,11 +262,13 @@ class Packing {
         } else if (const std::optional<double> usual = default_fill(variable.type)) {
             missing_.push_back(*usual);
         }
-        if (const Attribute* missing = find("missing_value", 0))
-            missing_.insert(missing_.end(), missing->values.begin(), missing->values.end());
+        if (const Attribute* missing = find("missing_value", 0)) add_missing(*missing);
         // As the variable holds them.
         if (variable.type == kFloats)
             for (double& value : missing_) value = double(float(value));
+        std::erase_if(missing_, [](double value) { return std::isnan(value); });
+        std::ranges::sort(missing_);
+        missing_.erase(std::unique(missing_.begin(), missing_.end()), missing_.end());
         std::uint32_t unpacked_type = 0;
         for (const auto& [name, to] :
              {std::pair("scale_factor", &scale_), std::pair("add_offset", &offset_)}) {
@@ -247,7 +283,7 @@ class Packing {
 
     // NaN where the value is missing, or outside the valid range.
     double operator()(double packed) const {
-        if (std::ranges::count(missing_, packed) > 0) return std::nan("");
+        if (std::isnan(packed) || std::ranges::binary_search(missing_, packed)) return std::nan("");
         const double value = packed * scale_ + offset_, checked = range_is_unpacked_ ? value : packed;
         return checked >= low_ && checked <= high_ ? value : std::nan("");
     }
@@ -255,7 +291,14 @@ class Packing {
   private:
     [[noreturn]] void fail(const std::string& attribute, const std::string& message) const {
         throw Error(ErrorCode::io, fmt::format("{}: the attribute {} of the variable {} {}", path_.string(),
-                                               attribute, variable_.name, message));
+                                               attribute, shortened(variable_.name), message));
+    }
+
+    void add_missing(const Attribute& attribute) {
+        if (attribute.count > kMostOfAttribute)
+            fail("missing_value",
+                 fmt::format("has {} values: expected at most {}", attribute.count, kMostOfAttribute));
+        missing_.insert(missing_.end(), attribute.values.begin(), attribute.values.end());
     }
 
     // An attribute with that many numbers, with any number of them if `count` is 0.
@@ -266,8 +309,8 @@ class Packing {
         // The fill of characters is a character: it says nothing of numbers.
         if (attribute.type == kCharacters && variable_.type == kCharacters) return nullptr;
         if (attribute.type == kCharacters) fail(name, "is a text: expected a number");
-        if (count > 0 && attribute.values.size() != count)
-            fail(name, fmt::format("has {} values: expected {}", attribute.values.size(), count));
+        if (count > 0 && attribute.count != count)
+            fail(name, fmt::format("has {} values: expected {}", attribute.count, count));
         return &attribute;
     }
 
@@ -300,7 +343,7 @@ class Packing {
 
     const FoundVariable& variable_;
     const std::filesystem::path& path_;
-    std::vector<double> missing_;  // packed
+    std::vector<double> missing_;  // packed, in order, without NaN
     double scale_ = 1, offset_ = 0;
     double low_ = -std::numeric_limits<double>::infinity(), high_ = std::numeric_limits<double>::infinity();
     bool range_is_unpacked_ = false;
@@ -322,39 +365,42 @@ const FoundVariable& variable_named(const std::vector<FoundVariable>& variables,
     const auto fail = [&](const std::string& message) {
         throw Error(ErrorCode::io, path.string() + ": " + message);
     };
-    std::vector<std::string> names;
+    std::vector<std::string> names;  // the first of them
+    std::size_t count = 0;
     const FoundVariable* found = nullptr;
     for (const FoundVariable& variable : variables) {
-        if (variable.dimensions.size() >= 2) names.push_back(variable.name);
-        if (name.empty() ? variable.dimensions.size() >= 2 && names.size() == 1 : variable.name == name)
-            found = &variable;
+        const bool is_candidate = variable.dimensions.size() >= 2;
+        if (is_candidate && ++count <= kMostListed) names.push_back(shortened(variable.name));
+        if (name.empty() ? is_candidate && count == 1 : variable.name == name) found = &variable;
     }
-    const std::string listed = fmt::format("{}", fmt::join(names, ", "));
+    const std::string more = count > names.size() ? fmt::format(" and {} more", count - names.size()) : "";
+    const std::string listed = fmt::format("{}{}", fmt::join(names, ", "), more);
     if (found == nullptr && names.empty()) fail("has no variable with two or more dimensions");
     if (found == nullptr)
         fail(fmt::format("has no variable {}; those with two or more dimensions are {}", name, listed));
-    if (name.empty() && names.size() > 1)
+    if (name.empty() && count > 1)
         fail(fmt::format("has several variables: name one with --variable (`variable` of a target) of {}",
                          listed));
     if (found->dimensions.empty())
-        fail(fmt::format("the variable {} is a single number without dimensions", found->name));
+        fail(fmt::format("the variable {} is a single number without dimensions", shortened(found->name)));
     return *found;
 }
 
 // A dimension with what its coordinate variable says. Values that lie beyond the end of the file are left out: no
 // other value depends on them.
-NetcdfAxis axis_of(const Reader& reader, const std::vector<FoundVariable>& variables, std::uint64_t dimension,
+NetcdfAxis axis_of(Reader& reader, const std::vector<FoundVariable>& variables, std::uint64_t dimension,
                    const NetcdfDimension& named, const std::filesystem::path& path) {
     NetcdfAxis axis{named.name, named.size, {}, {}, {}, {}, {}, {}};
     const auto coordinate = std::ranges::find_if(variables, [&](const FoundVariable& variable) {
         return variable.name == named.name && variable.dimensions == std::vector{dimension};
     });
     if (coordinate == variables.end()) return axis;
+    const Attributes attributes = attributes_at(reader, coordinate->attributes_at, path);
     for (const auto& [name, to] :
          {std::pair("axis", &axis.axis), std::pair("standard_name", &axis.standard_name),
           std::pair("units", &axis.units), std::pair("positive", &axis.positive)}) {
-        const auto attribute = coordinate->attributes.find(name);
-        if (attribute == coordinate->attributes.end()) continue;
+        const auto attribute = attributes.find(name);
+        if (attribute == attributes.end()) continue;
         *to = attribute->second.text;
         while (!to->empty() && (to->back() == '\0' || to->back() == ' ')) to->pop_back();
     }
@@ -397,19 +443,25 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
         std::string dimension = reader.name();
         dimensions.push_back({std::move(dimension), reader.count()});
     }
-    read_attributes(reader, path);
+    skip_attributes(reader, path);
     reader.next<std::uint32_t>();
     std::vector<FoundVariable> variables;
     std::uint64_t record_bytes = 0, record_variables = 0;
     for (std::uint64_t left = reader.count(); left > 0; --left) {
         FoundVariable& variable = variables.emplace_back();
         variable.name = reader.name();
-        for (std::uint64_t rank = reader.count(); rank > 0; --rank) {
+        const std::uint64_t rank = reader.count();
+        if (rank > kMostDimensions)
+            throw Error(ErrorCode::io,
+                        fmt::format("{}: has a variable of {} dimensions; at most {} can be read",
+                                    path.string(), rank, kMostDimensions));
+        for (std::uint64_t n = 0; n < rank; ++n) {
             variable.dimensions.push_back(reader.count());
             if (variable.dimensions.back() >= dimensions.size())
                 throw Error(ErrorCode::io, path.string() + ": is damaged");
         }
-        variable.attributes = read_attributes(reader, path);
+        variable.attributes_at = reader.at();
+        skip_attributes(reader, path);
         variable.type = reader.next<std::uint32_t>();
         variable.bytes = reader.count();
         variable.begin = reader.offset();
@@ -434,6 +486,7 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
     }
     data.is_record = dimensions[found->dimensions[0]].size == 0;
     data.found = *found;
+    data.found.attributes = attributes_at(reader, found->attributes_at, path);
     // Records of a file's only record variable follow each other without padding (NetCDF classic format, note on vsize).
     data.record_bytes =
         record_variables == 1 ? data.in_record * size_of_type(data.found.type, path) : record_bytes;

@@ -19,6 +19,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "core/text.h"
+#include "simulation/checked_json.h"
 #include "simulation/layer_simulation.h"
 
 namespace nephos {
@@ -230,7 +231,7 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
         if (torn) continue;
         bytes = at + line.size() + 1;
         try {
-            const Json json = Json::parse(line);
+            const Json json = parsed_json_text(line);
             require_this_version(json, path, use);
             RunRecord record = record_of(json);
             record.shard = shard;
@@ -324,7 +325,7 @@ void remove_shards(const std::filesystem::path& folder, std::uint32_t number, st
         std::erase_if(files, [&](const auto& path) { return path != shard_path(folder, number, of); });
     std::vector<Descriptor> locks;
     for (const std::filesystem::path& path : files) {
-        locks.push_back(open_regular_file(path, O_RDWR));
+        locks.push_back(open_regular_file(path, O_RDWR | O_NOFOLLOW));
         lock(path, locks.back());
     }
     for (const std::filesystem::path& path : files) {
@@ -343,7 +344,7 @@ FolderGuard::FolderGuard(const std::filesystem::path& folder) : folder_(folder) 
     std::filesystem::create_directories(shards, error);
     if (error) throw Error(ErrorCode::io, shards.string() + ": cannot make the folder: " + error.message());
     // A file that is open for writing: NFS locks no folders, and no others exclusively.
-    file_ = open_regular_file(shards / "lock", O_RDWR | O_CREAT).release();
+    file_ = open_regular_file(shards / "lock", O_RDWR | O_CREAT | O_NOFOLLOW).release();
     // Where a file system has no locks, nothing is kept apart, as with those of shards.
     while (::flock(file_, LOCK_EX) != 0 && errno == EINTR) {
     }
@@ -376,8 +377,10 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
     if (error)
         throw Error(ErrorCode::io,
                     path_.parent_path().string() + ": cannot make the folder: " + error.message());
-    files_->records = open_regular_file(path_, O_WRONLY | O_APPEND | O_CREAT);
-    files_->series = open_regular_file(series_path_, O_WRONLY | O_APPEND | O_CREAT);
+    // What they are cut to is no file that somebody else has put a link to here.
+    constexpr int kOwn = O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW;
+    files_->records = open_regular_file(path_, kOwn);
+    files_->series = open_regular_file(series_path_, kOwn);
     lock(path_, files_->records);
     Records records;
     records.folders_ = 1;

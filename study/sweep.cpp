@@ -3,13 +3,17 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstring>
 #include <fstream>
 #include <optional>
 #include <set>
+#include <span>
 
 #include "study/sweep_file.h"
 #include "study/workers.h"
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include "core/atomic_file.h"
 #include "core/bytes.h"
@@ -22,6 +26,21 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kNamedFailures = 5;
+
+// Before the runs: what stands in its place is refused at once.
+Descriptor open_timing(const std::filesystem::path& path) {
+    return open_regular_file(path, O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW);
+}
+
+// Appends the time that a shard took. Returns the system's error, 0 without one.
+int add_timing(const Descriptor& file, const SweepJob& job, int workers, std::uint64_t runs, double wall_s) {
+    struct stat status {};
+    const bool begins = ::fstat(file.get(), &status) == 0 && status.st_size == 0;
+    const std::string text =
+        fmt::format("{}{},{},{},{},{:.3f}\n", begins ? "shard,shards,workers,runs,wall_s\n" : "", job.shard,
+                    job.shards, workers, runs, wall_s);
+    return write_all(file.get(), std::as_bytes(std::span(text)));
+}
 
 // By the value of the id: neither the order of runs nor a grown axis moves a run to another shard.
 bool is_of_shard(const PlannedRun& run, const SweepJob& job) {
@@ -201,14 +220,14 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
     workers.idle = [&] {
         if (progress) progress(count);
     };
+    const std::filesystem::path times = job.folder / "timing.csv";
+    const Descriptor timing = open_timing(times);
     work(workers, next, task, end);
     shard.flush();
     report.complete = count.done == count.in_all;
     report.wall_s = std::chrono::duration<double>(Clock::now() - begin).count();
-    std::ofstream timing(job.folder / "timing.csv", std::ios::app);
-    if (timing.tellp() == 0) timing << "shard,shards,workers,runs,wall_s\n";
-    timing << fmt::format("{},{},{},{},{:.3f}\n", job.shard, job.shards, workers.count,
-                          count.done - count.before, report.wall_s);
+    if (const int error = add_timing(timing, job, workers.count, count.done - count.before, report.wall_s))
+        report.problems.push_back(times.string() + ": cannot write: " + std::strerror(error));
     return report;
 }
 

@@ -5,12 +5,14 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <unordered_set>
 
 #include "study/run_statistics.h"
 #include "study/toml_table.h"
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "core/text.h"
 #include "simulation/layer_simulation.h"
 
@@ -104,15 +106,16 @@ std::vector<std::string> pieces(std::string_view text, char separator) {
 
 std::vector<std::string> spread_values(double from, double to, std::uint64_t count, Scale scale) {
     std::vector<std::string> values;
+    std::unordered_set<std::string> known;
     for (std::uint64_t n = 0; n < count; ++n) {
         const double unit = double(n) / double(count - 1);
-        double value = scale == Scale::log ? from * std::pow(to / from, unit) : from + unit * (to - from);
+        double value = scale == Scale::log ? geometric(from, to, unit) : from + unit * (to - from);
         if (n == 0) value = from;
         if (n + 1 == count) value = to;
         if (scale == Scale::integer) value = std::floor(value + 0.5);
         // 12 digits: 0.1..0.3:3 has the value 0.2, and not the double beside it.
         std::string text = number_text(value, 12);
-        if (std::ranges::count(values, text) == 0) values.push_back(std::move(text));
+        if (known.insert(text).second) values.push_back(std::move(text));
     }
     return values;
 }

@@ -56,11 +56,12 @@ TomlTable::TomlTable(Document& document, const Node& node, std::string path)
 TomlTable::~TomlTable() {
     std::vector<std::string_view> known(asked_.begin(), asked_.end());
     for (const Entry& entry : node_.entries) {
+        if (document_.is_full()) break;
         if (std::ranges::count(asked_, entry.name) > 0) continue;
         const std::string_view closest = closest_word(entry.name, known);
         std::string expected = closest.empty() ? "expected one of: " + joined(asked_)
                                                : fmt::format("did you mean `{}`?", closest);
-        document_.report(entry.place, fmt::format("unknown key `{}`", path_of(entry.name)),
+        document_.report(entry.place, fmt::format("unknown key `{}`", path_of(shortened(entry.name))),
                          std::move(expected));
     }
 }
@@ -85,7 +86,9 @@ void TomlTable::report(const std::string& key, const std::string& message, const
     document_.report(entry ? entry->value.place : node_.place, message, expected);
 }
 
-void TomlTable::report(Problem problem) { document_.problems.push_back(std::move(problem)); }
+void TomlTable::report(Problem problem) {
+    if (!document_.is_full()) document_.problems.push_back(std::move(problem));
+}
 
 bool TomlTable::has(std::string_view key) { return find(key) != nullptr; }
 
@@ -146,7 +149,7 @@ std::optional<std::size_t> TomlTable::word(const std::string& key,
     const auto found = std::ranges::find(words, *value);
     if (found != words.end()) return std::size_t(found - words.begin());
     const std::string_view closest = closest_word(*value, words);
-    report(key, fmt::format("`{}` is \"{}\"", path_of(key), printable(*value)),
+    report(key, fmt::format("`{}` is \"{}\"", path_of(key), shortened(*value)),
            closest.empty() ? fmt::format("expected {}", fmt::join(words, ", "))
                            : fmt::format("did you mean \"{}\"?", closest));
     return std::nullopt;
@@ -198,7 +201,7 @@ void TomlTable::tables(const std::string& key, const std::function<void(TomlTabl
     if (entry == nullptr) return;
     if (entry->value.kind != Node::Kind::array)
         return wrong_kind(*entry, fmt::format("tables, each under [[{}]]", key));
-    for (std::size_t n = 0; n < entry->value.items.size(); ++n) {
+    for (std::size_t n = 0; n < entry->value.items.size() && !document_.is_full(); ++n) {
         const Node& item = entry->value.items[n];
         if (item.kind != Node::Kind::table) {
             document_.report(item.place,
@@ -223,7 +226,8 @@ void read_toml_file(const std::filesystem::path& path, const std::function<void(
         TomlTable table(document, *root, {});
         read(table);
     }
-    if (!document.problems.empty()) throw SceneErrors(document.problems);
+    if (document.is_full()) throw_problems(std::move(document.problems), path.string());
+    if (!document.problems.empty()) throw SceneErrors(std::move(document.problems));
 }
 
 }  // namespace nephos

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Reads the tables of study files with the errors of scenes: every problem at once, each with its place, a caret, and the
-// key that was meant. Private to study/.
+// Reads the tables of study files with the errors of scenes: every problem at once up to kMostProblems, each with its
+// place, a caret, and the key that was meant. Private to study/.
 
 #include <cstdint>
 #include <functional>
@@ -51,7 +51,7 @@ class TomlTable {
     std::vector<std::string> asked_;
 };
 
-// Reads a file into a table; messages call it by its `kind`. Throws SceneErrors with every problem, Error(io).
+// Reads a file into a table; messages call it by its `kind`. Throws SceneErrors with the problems, Error(io).
 void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read,
                     std::string_view kind = "scene");
 

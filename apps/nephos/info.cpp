@@ -17,6 +17,7 @@
 #include "core/text.h"
 #include "density/vdb/vdb_file.h"
 #include "render/image/image_file.h"
+#include "simulation/checked_json.h"
 
 namespace nephos {
 namespace {
@@ -43,19 +44,21 @@ FileKind kind_of(const std::string& path) {
 }
 
 Json pairs_json(const std::vector<std::pair<std::string, std::string>>& pairs) {
-    Json json = Json::object();
-    for (const auto& [name, value] : pairs) json[name] = value;
-    return json;
+    Json::object_t members;  // appended to: Json compares each name with all before
+    for (const auto& [name, value] : pairs) members.emplace_back(name, value);
+    merge_doubles(members);
+    return members;
 }
 
 // Numbers as numbers, and texts as texts.
 Json entries_json(const std::vector<VdbMetadataEntry>& entries) {
-    Json json = Json::object();
+    Json::object_t members;
     for (const VdbMetadataEntry& entry : entries) {
         Json value = entry.is_json ? Json::parse(entry.value, nullptr, false) : Json(entry.value);
-        json[entry.name] = value.is_discarded() ? Json(entry.value) : std::move(value);
+        members.emplace_back(entry.name, value.is_discarded() ? Json(entry.value) : std::move(value));
     }
-    return json;
+    merge_doubles(members);
+    return members;
 }
 
 // The number of bytes of a text up to `limit` that does not cut a character of UTF-8.

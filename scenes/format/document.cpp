@@ -2,6 +2,7 @@
 #include "scenes/format/document.h"
 
 #include <algorithm>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -122,11 +123,56 @@ std::vector<std::size_t> find_line_starts(std::string_view text) {
 std::string_view line_of(const Origin& origin, int line) {
     if (line < 1 || std::size_t(line) > origin.line_starts.size()) return {};
     const std::size_t start = origin.line_starts[std::size_t(line) - 1];
-    std::string_view rest = std::string_view(origin.text).substr(start);
-    rest = rest.substr(0, std::min(rest.find('\n'), rest.size()));
+    const bool is_last = std::size_t(line) == origin.line_starts.size();
+    const std::size_t end = is_last ? origin.text.size() : origin.line_starts[std::size_t(line)] - 1;
+    std::string_view rest = std::string_view(origin.text).substr(start, end - start);
     if (!rest.empty() && rest.back() == '\r') rest.remove_suffix(1);
     return rest;
 }
+
+std::vector<LongLine> find_long_lines(const Origin& origin) {
+    constexpr std::size_t kLong = 1024;  // bytes
+    std::vector<LongLine> found;
+    for (int line = 1; line <= int(origin.line_starts.size()); ++line) {
+        const std::string_view text = line_of(origin, line);
+        if (text.size() <= kLong) continue;
+        LongLine& marked = found.emplace_back(LongLine{line, {}});
+        std::size_t character = 0;
+        for (std::size_t at = 0; at < text.size(); ++character) {
+            if (character % kCharactersOfMark == 0) marked.marks.push_back(at);
+            at += character_at(text, at).bytes.size();
+        }
+    }
+    return found;
+}
+
+// A line, and where its characters are: in long ones the walk begins at a mark.
+class Line {
+  public:
+    Line(const Origin& origin, int line) : text_(line_of(origin, line)) {
+        const auto found = std::ranges::lower_bound(origin.long_lines, line, {}, &LongLine::line);
+        if (found != origin.long_lines.end() && found->line == line) marks_ = found->marks;
+    }
+    std::string_view text() const { return text_; }
+    struct At {
+        std::size_t character = 0, byte = 0;
+    };
+    // A character counted from 0; the end where there are fewer.
+    At at(std::size_t character) const {
+        At found;
+        if (!marks_.empty()) {
+            const std::size_t mark = std::min(character / kCharactersOfMark, marks_.size() - 1);
+            found = {mark * kCharactersOfMark, marks_[mark]};
+        }
+        for (; found.character < character && found.byte < text_.size(); ++found.character)
+            found.byte += character_at(text_, found.byte).bytes.size();
+        return found;
+    }
+
+  private:
+    std::string_view text_;
+    std::span<const std::size_t> marks_;
+};
 
 Place place_of_offset(const Origin& origin, int index, std::size_t offset) {
     const auto after = std::upper_bound(origin.line_starts.begin(), origin.line_starts.end(), offset);
@@ -145,25 +191,18 @@ struct Excerpt {
     int caret = 0;
 };
 
-Excerpt excerpt_around(std::string_view line, int column) {
+Excerpt excerpt_around(const Line& line, int column) {
     constexpr std::size_t kBefore = 70, kAfter = 40;  // characters
-    std::vector<std::size_t> offsets;                 // of the characters up to the last one shown
     const auto requested = std::size_t(std::max(column, 1));
-    for (std::size_t at = 0; at < line.size() && offsets.size() < requested + kAfter;) {
-        offsets.push_back(at);
-        at += character_at(line, at).bytes.size();
-    }
-    const std::size_t caret = std::min(requested, offsets.size() + 1);  // one past the end is a place, too
+    const std::size_t caret = line.at(requested - 1).character + 1;  // one past the end is a place, too
     const std::size_t first = caret > kBefore ? caret - kBefore : 0;
-    const std::size_t begin = first < offsets.size() ? offsets[first] : line.size();
-    std::size_t end = line.size();
-    if (offsets.size() == requested + kAfter) end = offsets.back();
-    Excerpt excerpt{printable(line.substr(begin, end - begin)), int(caret - first)};
+    const std::size_t begin = line.at(first).byte, end = line.at(requested + kAfter - 1).byte;
+    Excerpt excerpt{printable(line.text().substr(begin, end - begin)), int(caret - first)};
     if (first > 0) {
         excerpt.text.insert(0, "...");
         excerpt.caret += 3;
     }
-    if (end < line.size()) excerpt.text += "...";
+    if (end < line.text().size()) excerpt.text += "...";
     return excerpt;
 }
 
@@ -246,19 +285,21 @@ std::string_view kind_name(Node::Kind kind) {
 
 int Document::add_origin(std::string label, std::string text, bool is_file) {
     if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
-    Origin origin{std::move(label), std::move(text), is_file, {}};
+    Origin origin{std::move(label), std::move(text), is_file, {}, {}};
     origin.line_starts = find_line_starts(origin.text);
+    origin.long_lines = find_long_lines(origin);
     origins_.push_back(std::move(origin));
     return int(origins_.size()) - 1;
 }
 
 void Document::report(const Place& place, std::string message, std::string expected) {
+    if (is_full()) return;
     problems.push_back(problem_at(place, std::move(message), std::move(expected)));
 }
 
 Problem Document::problem_at(const Place& place, std::string message, std::string expected) const {
     const Origin& from = origin(place.origin);
-    const Excerpt excerpt = excerpt_around(line_of(from, place.line), place.column);
+    const Excerpt excerpt = excerpt_around(Line(from, place.line), place.column);
     const SourcePosition where{from.label, from.is_file ? place.line : 0, place.column};
     return {where, std::move(message), std::move(expected), excerpt.text, excerpt.caret};
 }

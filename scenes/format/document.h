@@ -16,12 +16,20 @@
 
 namespace nephos {
 
+// A line that is too long to count its characters for each place in it.
+struct LongLine {
+    int line = 0;
+    std::vector<std::size_t> marks;  // bytes of the line before every kCharactersOfMark-th character
+};
+inline constexpr std::size_t kCharactersOfMark = 256;
+
 // A source text of nodes: the scene file or one --set option.
 struct Origin {
     std::string label;  // "scenes/cumulus.toml" or "--set density.half=maybe"
     std::string text;
     bool is_file = true;
     std::vector<std::size_t> line_starts;  // byte offsets
+    std::vector<LongLine> long_lines;      // in the order of the text
 };
 
 // The position of a character in an origin; line and column count from 1.
@@ -78,7 +86,9 @@ class Document {
     int add_origin(std::string label, std::string text, bool is_file);
     const Origin& origin(int index) const { return origins_[std::size_t(index)]; }
 
+    // Adds a problem; none from kMostProblems on.
     void report(const Place& place, std::string message, std::string expected = {});
+    bool is_full() const { return problems.size() >= kMostProblems; }
 
     // Returns the problem that report() adds.
     Problem problem_at(const Place& place, std::string message, std::string expected = {}) const;
@@ -104,8 +114,9 @@ class Document {
 // Reads the key `models`, base models from other scene files: inserts the [[model]] tables of the files that
 // `models` names in front of the document's own, in the order of the list, so that they are read, checked,
 // written and hashed as if they stood in the scene. What else those files hold is ignored, their own `models`
-// too. A relative name is relative to `folder`, one from a --set option to the current folder. Problems are
-// reported.
+// too. A file is read once, however often it is named, and its models are inserted each time. A relative name is
+// relative to `folder`, one from a --set option to the current folder. Problems are reported, among them more files
+// than 1,000, and more of them than 64 MiB.
 void take_models_from_files(Document& document, const std::filesystem::path& folder);
 
 }  // namespace nephos

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <system_error>
 
 #include "scenes/format/document.h"
@@ -13,6 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+const char* const kWanted =
+    "expected a scene file with [[model]] tables, named relative to the scene's folder";
+
 // Returns "did you mean `genera/Cu.toml`?" when the folder of the missing file has one of a similar name.
 std::string advice_on_missing_file(const fs::path& path, const fs::path& requested) {
     std::error_code error;
@@ -24,39 +28,91 @@ std::string advice_on_missing_file(const fs::path& path, const fs::path& request
     std::sort(names.begin(), names.end());
     const std::vector<std::string_view> known(names.begin(), names.end());
     const std::string_view meant = closest_word(path.filename().string(), known);
-    if (meant.empty())
-        return "expected a scene file with [[model]] tables, named relative to the scene's folder";
+    if (meant.empty()) return kWanted;
     return "did you mean " + enclosed((requested.parent_path() / std::string(meant)).generic_string(), '"') +
            "?";
 }
 
-// The [[model]] tables of one file; `name` is the item of `models` that names it.
-std::vector<Node> models_in_file(Document& document, const Node& name, const std::string& path_of_item,
-                                 const fs::path& folder) {
-    const bool in_file = document.origin(name.place.origin).is_file;
-    const fs::path path = in_file ? (folder / name.text).lexically_normal() : fs::path(name.text);
-    const auto fail = [&](const std::string& what, std::string expected) {
-        document.report(name.place, enclosed(path_of_item, '`') + ": " + what, std::move(expected));
-        return std::vector<Node>();
-    };
-    std::string text;
-    try {
-        text = read_text_file(path, kMaxSceneBytes);
-    } catch (const Error& error) {
-        return fail(error.what(), advice_on_missing_file(path, name.text));
+constexpr std::size_t kMostFiles = 1000;
+// Of all files, each counted as often as it is named.
+constexpr std::size_t kMostBytes = std::size_t(64) << 20;
+constexpr std::size_t kMostAdvised = 20;  // looking for similar names takes long in a large folder
+
+// What a file has for whoever names it.
+struct ModelFile {
+    std::size_t bytes = 0;
+    std::vector<Node> models;
+    // No problem: there is none, or one with a place in the file, which is reported.
+    std::string problem, expected;
+};
+
+// The files that `models` names, each read once.
+class ModelFiles {
+  public:
+    ModelFiles(Document& document, const fs::path& folder) : document_(document), folder_(folder) {}
+
+    // Adds the [[model]] tables of a file; `name` is the item of `models` that names it. Returns false when there are
+    // too many files, or they are too large, which is reported as any other problem.
+    bool add(const Node& name, const std::string& path_of_item, std::vector<Node>& models) {
+        const bool in_file = document_.origin(name.place.origin).is_file;
+        const fs::path path = in_file ? (folder_ / name.text).lexically_normal() : fs::path(name.text);
+        auto found = files_.find(path.string());
+        if (found == files_.end()) {
+            if (files_.size() == kMostFiles) return refuse(name, path_of_item);
+            found = files_.emplace(path.string(), read(path, name.text)).first;
+        }
+        const ModelFile& file = found->second;
+        bytes_ += file.bytes;
+        if (bytes_ > kMostBytes) return refuse(name, path_of_item);
+        if (!file.problem.empty())
+            document_.report(name.place, enclosed(path_of_item, '`') + ": " + file.problem, file.expected);
+        models.insert(models.end(), file.models.begin(), file.models.end());
+        return true;
     }
-    if (text.size() > kMaxSceneBytes) {
-        return fail(path.string() + " is larger than " + std::to_string(kMaxSceneBytes >> 20) + " MiB",
-                    "expected a scene in TOML");
+
+  private:
+    bool refuse(const Node& name, const std::string& path_of_item) {
+        document_.report(name.place,
+                         enclosed(path_of_item, '`') + ": the files up to this one are too many or too large",
+                         "expected at most " + std::to_string(kMostFiles) + " files, of " +
+                             std::to_string(kMostBytes >> 20) + " MiB together");
+        return false;
     }
-    std::optional<Node> root = document.parse(document.add_origin(path.string(), std::move(text), true));
-    if (!root) return {};
-    Entry* models = root->find("model");
-    if (models == nullptr || models->value.kind != Node::Kind::array) {
-        return fail(path.string() + " has no [[model]]", "expected a scene file with base models");
+
+    ModelFile read(const fs::path& path, const fs::path& requested) {
+        std::string text;
+        try {
+            text = read_text_file(path, kMaxSceneBytes);
+        } catch (const Error& error) {
+            return {0,
+                    {},
+                    error.what(),
+                    ++missing_ <= kMostAdvised ? advice_on_missing_file(path, requested) : kWanted};
+        }
+        ModelFile file{text.size(), {}, {}, {}};
+        if (text.size() > kMaxSceneBytes) {
+            file.problem = path.string() + " is larger than " + std::to_string(kMaxSceneBytes >> 20) + " MiB";
+            file.expected = "expected a scene in TOML";
+            return file;
+        }
+        std::optional<Node> root =
+            document_.parse(document_.add_origin(path.string(), std::move(text), true));
+        if (!root) return file;
+        Entry* models = root->find("model");
+        if (models == nullptr || models->value.kind != Node::Kind::array) {
+            file.problem = path.string() + " has no [[model]]";
+            file.expected = "expected a scene file with base models";
+            return file;
+        }
+        file.models = std::move(models->value.items);
+        return file;
     }
-    return std::move(models->value.items);
-}
+
+    Document& document_;
+    const fs::path& folder_;
+    std::map<std::string, ModelFile> files_;
+    std::size_t bytes_ = 0, missing_ = 0;
+};
 
 }  // namespace
 
@@ -68,11 +124,11 @@ void take_models_from_files(Document& document, const fs::path& folder) {
     if (many) names = files->value.items;
     std::vector<Node> models;
     const std::size_t problems = document.problems.size();
-    for (std::size_t n = 0; n < names.size() && models.size() <= std::size_t(kMaxModels); ++n) {
+    ModelFiles read(document, folder);
+    for (std::size_t n = 0;
+         n < names.size() && models.size() <= std::size_t(kMaxModels) && !document.is_full(); ++n) {
         if (names[n].kind != Node::Kind::text) continue;  // reported when the scene is read
-        std::vector<Node> more =
-            models_in_file(document, names[n], many ? indexed("models", n) : "models", folder);
-        std::move(more.begin(), more.end(), std::back_inserter(models));
+        if (!read.add(names[n], many ? indexed("models", n) : "models", models)) break;
     }
     document.models_missing = document.problems.size() > problems;
     if (models.empty()) return;

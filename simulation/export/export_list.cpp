@@ -11,6 +11,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "simulation/checked_json.h"
+#include "simulation/manifest.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -90,9 +91,7 @@ ExportedFile file_of(const CheckedJson& json) {
     ExportedFile file;
     file.path = json.at("path").text();
     file.digest = {std::uint64_t(json.at("bytes").integer(0, kMostBytes)), json.at("xxh3").text()};
-    const bool inside = !file.path.empty() && file.path.is_relative() &&
-                        file.path.lexically_normal() == file.path && *file.path.begin() != "..";
-    if (!inside) json.at("path").fail("a file of its folder");
+    if (!is_inside_folder(file.path)) json.at("path").fail("a file of its folder");
     if (!json.has("source")) return file;
     file.source = json.at("source").text();
     file.format = format_name_of(json.at("format"));

@@ -14,6 +14,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/text.h"
 #include "scenes/format/reader.h"
 
 namespace nephos {
@@ -109,6 +110,33 @@ TEST(BadScenes, HugeFileIsRefusedAtOnce) {
     EXPECT_THROW(read_scene(path), SceneErrors);
     EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
     fs::remove(path);
+}
+
+// In a line of many characters, of one byte and of more, the caret stands below what is meant.
+TEST(BadScenes, PlacesInALongLineAreTheRightOnes) {
+    std::string text = "sun = { ";
+    for (int n = 0; n < 3000; ++n) {
+        if (n > 0) text += ", ";
+        const std::string number = std::to_string(n);
+        text += (n % 3 == 0 ? "\"\u00e4\u96f2" : "\"key") + number + "\" = " + number;
+    }
+    try {
+        read_scene_text(text + " }\n", "long.toml");
+        FAIL();
+    } catch (const SceneErrors& errors) {
+        ASSERT_EQ(errors.problems().size(), 1001u);
+        for (int n = 0; n < 1000; ++n) {
+            const Problem& problem = errors.problems()[std::size_t(n)];
+            std::size_t at = 0;
+            for (int column = 1; column < problem.caret; ++column)
+                at += character_at(problem.source_line, at).bytes.size();
+            const std::string key = (n % 3 == 0 ? "\u00e4\u96f2" : "key") + std::to_string(n);
+            EXPECT_EQ(problem.source_line.substr(at, key.size() + 2), "\"" + key + "\"")
+                << problem.source_line;
+            EXPECT_NE(problem.message.find("`" + key + "`"), std::string::npos) << problem.message;
+            EXPECT_LT(problem.source_line.size(), 500u);
+        }
+    }
 }
 
 // The worst that fits into the size limit: time and messages stay bounded.

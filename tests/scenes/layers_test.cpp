@@ -99,6 +99,59 @@ TEST_F(ModelFiles, ProblemsNameTheirFileAndLine) {
     EXPECT_NE(messages().find("genera/Cu.toml:1:"), std::string::npos) << messages();
 }
 
+// However often a file is named, and by whatever detour: its models come each time, its problems once.
+TEST_F(ModelFiles, AreReadOnce) {
+    write("genera/Cu.toml", kCu);
+    write("scene.toml",
+          "models = [\"genera/Cu.toml\", \"genera/../genera/Cu.toml\", \"scene.toml\", \"scene.toml\"]\n"
+          "[[model]]\nname = \"own\"\nseeds = [{}]\n");
+    const Scene scene = read({"model[1].name=b", "model[2].name=c", "model[3].name=d"});
+    ASSERT_EQ(scene.models.size(), 5u);
+    EXPECT_EQ(scene.models[0].seeds[0].size_m, (Vec3{30, 20, 10}));
+    EXPECT_EQ(scene.models[1].seeds[0].size_m, (Vec3{30, 20, 10}));
+    EXPECT_EQ(scene.models[4].name, "own");
+    write("scene.toml", "models = [\"genera/Cu.toml\", \"genera/../genera/Cu.toml\"]\n");
+    write("genera/Cu.toml", "[[model]\n");
+    EXPECT_NE(messages().find("\n1 error\n"), std::string::npos) << messages();
+    write("genera/Cu.toml", "name = \"none\"\n");
+    EXPECT_NE(messages().find("\n2 errors\n"), std::string::npos) << messages();
+}
+
+TEST_F(ModelFiles, AreLimitedInNumberAndSize) {
+    std::string list = "models = [";
+    for (int n = 0; n < 1001; ++n) {
+        const std::string name = "genera/" + std::to_string(n) + ".toml";
+        write(name, "model = []\n");
+        list += "\"" + name + "\", ";
+    }
+    write("scene.toml", list + "]\n");
+    EXPECT_NE(messages().find("`models[1000]`: the files up to this one are too many or too large\n"),
+              std::string::npos)
+        << messages();
+    const std::string model = "model = []\n# ";
+    write("large.toml", model + std::string(kMaxSceneBytes - model.size(), 'x'));
+    list = "models = [";
+    for (int n = 0; n < 9; ++n) list += "\"large.toml\", ";
+    write("scene.toml", list + "]\n");
+    EXPECT_NE(messages().find("`models[8]`: the files up to this one are too many or too large\n"),
+              std::string::npos)
+        << messages();
+    EXPECT_NE(messages().find("\n1 error\n"), std::string::npos) << messages();
+}
+
+TEST_F(ModelFiles, ThatAreMissingMakeNoEndlessList) {
+    write("genera/Cu.toml", kCu);
+    std::string list = "models = [";
+    for (int n = 0; n < 3000; ++n) list += "\"genera/Cu" + std::to_string(n % 1500) + ".toml\", ";
+    write("scene.toml", list + "]\n");
+    const std::string said = messages();
+    EXPECT_NE(said.find("\n1001 errors\n"), std::string::npos);
+    std::size_t advised = 0;
+    for (std::size_t at = said.find("did you mean"); at != said.npos; at = said.find("did you mean", at + 1))
+        ++advised;
+    EXPECT_EQ(advised, 20u) << "for these the folder was looked through";
+}
+
 const char* const kTwoLayers = R"(
 seed = 77
 [lattice]

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <deque>
 #include <numbers>
+#include <random>
 
 #include "statistics/cloud_sizes.h"
 #include "statistics/cloud_statistics.h"
@@ -141,6 +142,22 @@ void expect_all(const std::vector<ConnectedCloud>& got, const std::vector<Connec
                 const Extent& e, const Boundaries& b) {
     expect_same(got, expected);
     expect_same_centroids(got, expected, e, b);
+}
+
+// What is counted before memory is taken: the runs of the shadow, one by one.
+TEST(Clouds, RunsOfTheShadowAreCounted) {
+    std::mt19937_64 random(31);
+    for (const Extent extent :
+         {Extent{1, 1, 1}, Extent{64, 3, 2}, Extent{65, 9, 1}, Extent{200, 7, 3}, Extent{129, 1, 5}}) {
+        const BitPlane plane = test::random_cells(extent, 0.3, random), shadow = shadow_of(plane.view());
+        std::uint64_t runs = 0;
+        for (int j = 0; j < extent.y; ++j)
+            for (int i = 0; i < extent.x; ++i)
+                runs += shadow.get(i, j, 0) && (i == 0 || !shadow.get(i - 1, j, 0));
+        EXPECT_EQ(count_shadow_runs(plane.view()), runs);
+        EXPECT_GE(clouds_2d_bytes(extent, runs),
+                  runs * sizeof(CellRun) + clouds_2d(plane.view(), {}).size() * sizeof(ConnectedCloud));
+    }
 }
 
 TEST(Clouds, MatchFloodFill) {

@@ -6,15 +6,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <set>
+#include <string>
 
 #include "study/student.h"
 #include "study/sweep_file.h"
 #include "study/tables.h"
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "core/error.h"
+#include "scenes/format/errors.h"
 
 namespace nephos {
 namespace {
@@ -105,6 +110,38 @@ TEST(Tables, ErrorsOfFewReplicatesDifferOnlyBeyondChance) {
     EXPECT_FALSE(errors_differ(0.05, 0.003, 2));
     EXPECT_TRUE(errors_differ(0.05, 0, 3));
     EXPECT_FALSE(errors_differ(0, 0, 3));
+}
+
+// Whole numbers that a range meets several times, in its order and each once; as many texts as values elsewhere.
+TEST(Axis, ValuesAreSpreadWithoutRepetition) {
+    std::vector<std::string> whole;
+    for (int n = -3; n <= 40; ++n) whole.push_back(std::to_string(n));
+    EXPECT_EQ(spread_values(-3, 40, 100'000, Scale::integer), whole);
+    const std::vector<std::string> many = spread_values(0, 1, 100'000, Scale::linear);
+    EXPECT_EQ(many.size(), 100'000u);
+    EXPECT_EQ(std::set<std::string>(many.begin(), many.end()).size(), many.size());
+    EXPECT_EQ(many.front(), "0");
+    EXPECT_EQ(many.back(), "1");
+}
+
+TEST(SweepFile, ListsOnlySoManyProblems) {
+    const std::filesystem::path path =
+        std::filesystem::path(testing::TempDir()) / ("many-problems-" + std::to_string(::getpid()) + ".toml");
+    {
+        std::ofstream file(path);
+        file << "scene = \"a.toml\"\n";
+        for (int n = 0; n < 1500; ++n) file << "[[axis]]\nkey" << n << " = " << n << "\n";
+        file << std::string(100'000, 'x') << " = 1\n";
+    }
+    try {
+        read_sweep_file(path);
+        ADD_FAILURE();
+    } catch (const SceneErrors& errors) {
+        EXPECT_EQ(errors.problems().size(), 1001u);
+        EXPECT_NE(errors.problems().back().message.find("too many errors"), std::string::npos);
+        EXPECT_LT(std::string(errors.what()).size(), 1u << 20);
+    }
+    std::filesystem::remove(path);
 }
 
 TEST(Axis, IsReadFromTheCommandLine) {

@@ -459,6 +459,15 @@ class Export(Case):
                 self.assertIn("FAIL  voxels", self.call("verify", "out", status=1, preexec_fn=limited).stdout)
         (folder / "export.json").write_text("{\n\"format\": ")
         self.refused(3, "verify", "out", says="line 2 cannot be read")
+        # Many keys, and keys twice, of which the last counts; a long one is shortened.
+        text = json.dumps(whole)
+        many = "".join(f'"k{n}": [], ' for n in range(100_000))
+        (folder / "export.json").write_text(f"{{{many}\"complete\": 7, {text[1:]}")
+        self.call("verify", "out")
+        listing = json.loads(text)
+        listing["options"]["types"]["n" * 100_000] = 77
+        (folder / "export.json").write_text(json.dumps(listing))
+        self.assertLess(len(self.refused(3, "verify", "out", says="`options.types." + "n" * 60 + "...` is 77").stderr), 400)
         listing = dict(whole)
         del listing["options"]
         (folder / "export.json").write_text(json.dumps(listing))

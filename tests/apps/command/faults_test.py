@@ -12,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from case import Case, LONG, NEPHOS
+from case import Case, LONG, NEPHOS, SOURCE
 
 
 class Faults(Case):
@@ -145,6 +145,31 @@ class Faults(Case):
                     self.assertNotIn("--overwrite", result.stderr)
         self.assertEqual(self.run_into("out", "--resume").returncode, 0)
 
+    def fails_at_each_call(self, call, path, *arguments):
+        """Lets one call on a file fail after the other, also in the process that parses it; returns how many there are."""
+        for number in range(1, 100):
+            result = subprocess.run([NEPHOS, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=120,
+                                    env=self.failing(f"{call} EIO {number} 1", path))
+            if result.returncode == 0:
+                return number - 1
+            self.assertEqual(result.returncode, 3, result.stderr)
+            self.assertIn("Input/output error", result.stderr)
+            self.assertNotRegex(result.stderr, "damaged|truncated|early|memory")
+        self.fail(f"{call} fails for ever")
+
+    def test_a_file_for_a_parser_that_cannot_be_read_is_not_damaged(self):
+        self.assertEqual(self.run_into("out").returncode, 0)
+        (self.folder / "out/density/tiny_0001.vdb").rename(self.folder / "cloud.vdb")
+        for call, least in (("read", 2), ("lseek", 3)):
+            with self.subTest(call=call):
+                self.assertGreaterEqual(self.fails_at_each_call(call, "cloud.vdb", "info", "cloud.vdb"), least)
+        for name, source in (("height.png", "volcano.png"), ("height.raw", "crater.raw")):
+            with self.subTest(name=name):
+                shutil.copy(SOURCE / "scenes/maps" / source, self.folder / name)
+                map_of = ["validate", self.scene, "--set", f"ground.height_map={name}", "--set", "terrain.raw_columns=65",
+                          "--set", "terrain.raw_rows=65"]
+                self.assertGreaterEqual(self.fails_at_each_call("read", name, *map_of), 1)
+
     @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
     def test_an_encoder_that_cannot_read_is_an_error(self):
         arguments = ["run", self.scene, "--video", "--splatting", "cpu", "--set", "camera.height=32", "--out", "out"]
@@ -193,6 +218,18 @@ class Faults(Case):
         (self.folder / "renamed").rename(self.folder / "elsewhere")
         self.ends_with(process, "renamed: the folder was removed or renamed")
         self.assertFalse((self.folder / "renamed/manifest.json").exists())
+
+    def test_rows_are_not_appended_to_what_a_link_leads_to(self):
+        process = self.started("out")
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=120)
+        table, other = self.folder / "out/statistics.csv", self.folder / "other.csv"
+        table.rename(other)
+        table.symlink_to(other)
+        before = other.read_bytes()
+        self.refused(3, "run", "long.toml", "--no-render", "--resume", "--out", "out",
+                     says="statistics.csv: is a link, which is not followed here")
+        self.assertEqual(other.read_bytes(), before)
 
     def test_parts_that_are_removed_are_missed_at_the_end(self):
         for name in ("density/long_0002.vdb", "statistics.csv"):

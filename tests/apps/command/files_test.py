@@ -40,6 +40,23 @@ class Files(Case):
                 self.refused(3, "render", path, "--out", "x.png", says=name)
                 self.refused(3, "hash", self.scene, "--from", path, says=name)
 
+    def test_a_picture_of_many_attributes(self):
+        def attribute(name, kind, value):
+            return f"{name}\0{kind}\0".encode() + struct.pack("<I", len(value)) + value
+        channels = b"Y\0" + struct.pack("<IIII", 2, 0, 1, 1) + b"\0"
+        names = [f"a{n:06}" for n in range(30_000)]
+        head = b"\x76\x2f\x31\x01" + struct.pack("<I", 2) + attribute("channels", "chlist", channels)
+        head += attribute("compression", "compression", b"\0") + attribute("lineOrder", "lineOrder", b"\0")
+        for window in ("dataWindow", "displayWindow"):
+            head += attribute(window, "box2i", bytes(16))
+        head += attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+        head += attribute("screenWindowCenter", "v2f", bytes(8)) + attribute("screenWindowWidth", "float", struct.pack("<f", 1))
+        head += b"".join(attribute(name, "string", name[1:].encode()) for name in names) + b"\0"
+        (self.folder / "many.exr").write_bytes(head + struct.pack("<Qii", len(head) + 8, 0, 4) + bytes(4))
+        attributes = json.loads(self.call("info", "many.exr", "--json").stdout)["parts"][0]["attributes"]
+        self.assertEqual([name for name in attributes if name[0] == "a"], names)
+        self.assertTrue(all(attributes[name] == name[1:] for name in names))
+
     def test_pipes_and_links_in_the_folder_of_a_run(self):
         for name in ("manifest.json", "statistics.csv", "checkpoint.nephos", "density/tiny_0001.vdb"):
             shutil.rmtree(self.folder / "out", ignore_errors=True)
@@ -78,6 +95,19 @@ class Files(Case):
             self.refused(2, "run", self.scene, "--no-render", "--out", "out", says="manifest.json")
             self.assertEqual((self.folder / "out/manifest.json").read_text(), text)
         self.assertEqual(len(list((self.folder / "out").iterdir())), 1)
+        # Of many keys, and of long lists, in and beside what is read.
+        self.call("run", self.scene, "--no-render", "--out", "whole")
+        whole = json.loads((self.folder / "whole/manifest.json").read_text())
+        other = json.loads(json.dumps(whole))
+        other["scene"]["hash"] = "0" * 32
+        other["parameters"].update({f"k{n}": "1" for n in range(100_000)}, seed="4")
+        other["list"] = [{}] * 200_000
+        self.write("out/manifest.json", json.dumps(other))
+        self.refused(2, "run", self.scene, "--no-render", "--out", "out", says="`seed` was 4, now 3; `k0` was 1, now not there")
+        whole["list"] = other["list"]
+        whole.update({f"k{n}": [] for n in range(100_000)})
+        (self.folder / "whole/manifest.json").write_text(json.dumps(whole))
+        self.call("verify", "whole")
         self.call("run", self.scene, "--no-render", "--out", "out", "--overwrite")
 
     def test_a_run_of_another_scene_stays(self):

@@ -195,6 +195,8 @@ class Stats(Case):
                 (values, "f4", {"missing_value": 9e9}),
                 (numpy.where(gone, numpy.where(numpy.arange(50) % 2, 7.0, 9e9), mask * 2e-5), "f4",
                  {"missing_value": numpy.array([7.0, 9e9])}),
+                (numpy.where(gone, numpy.where(numpy.arange(50) % 2, 7.0, math.nan), mask * 2e-5), "f4",
+                 {"missing_value": numpy.array([9e9, math.nan, 7.0, 7.0, -3.0])}),
                 (values, "f4", {"valid_range": numpy.array([0, 1], dtype="f4")}),
                 (values, "f4", {"valid_max": numpy.float32(1)}),
                 (numpy.where(gone, -1, mask * -2e-5), "f4", {"valid_min": numpy.float32(-0.5), "scale_factor": numpy.float32(-1)}),
@@ -224,6 +226,8 @@ class Stats(Case):
         for attributes, says in (({"valid_range": numpy.array([0.0])}, "valid_range of the variable ql has 1 values: expected 2"),
                                  ({"valid_range": numpy.array([2.0, 1.0])}, "valid_range of the variable ql is empty"),
                                  ({"scale_factor": "two"}, "scale_factor of the variable ql is a text: expected a number"),
+                                 ({"missing_value": numpy.arange(10_001.0)},
+                                  "missing_value of the variable ql has 10001 values: expected at most 10000"),
                                  ({"scale_factor": math.nan}, "scale_factor of the variable ql is not finite")):
             name = self.netcdf("bad.nc", values, ("y", "x"), **attributes)
             self.refused(3, "stats", name, "--cell-size", "50", says=says)
@@ -247,8 +251,9 @@ class Stats(Case):
             return (b"\x89PNG\r\n\x1a\n" + piece(b"IHDR", struct.pack(">IIBBBBB", width, height, depth, 0, 0, 0, 0)) +
                     piece(b"IDAT", data) + piece(b"IEND", b""))
         limit = lambda: limit_addresses(2 << 30)
-        for width, height, status, says in ((65536, 65536, 2, "at most 65536 along a side and 1073741824 in all"),
-                                            (32768, 32768, 3, "its head claims 32768 x 32768 pixels, more than"),
+        for width, height, status, says in ((65536, 65536, 2, "at most 65536 along a side and 268435456 in all"),
+                                            (32768, 8193, 2, "32768 x 8193 pixels; at most"),
+                                            (16384, 16384, 3, "its head claims 16384 x 16384 pixels, more than"),
                                             (70000, 1, 2, "70000 x 1 pixels; at most")):
             (self.folder / "small.png").write_bytes(png(width, height, 8, zlib.compress(b"\0" * 100)))
             self.assertLess((self.folder / "small.png").stat().st_size, 100)
@@ -256,6 +261,19 @@ class Stats(Case):
         # What is packed as tightly as deflate can is read.
         (self.folder / "clear.png").write_bytes(png(8000, 8000, 1, zlib.compress(b"\0" * (1001 * 8000), 9)))
         self.assertEqual(self.stats("clear.png", "--cell-size", "5")["statistics"]["cover"]["mean"], 0)
+
+    @unittest.skipIf(SANITIZED, "it limits memory")
+    def test_clouds_that_take_too_much_memory_are_refused(self):
+        """A small picture of millions of clouds; and one of half a cloud, whose random twins are of millions."""
+        dots = numpy.zeros((4096, 4096), numpy.uint8)
+        dots[::2, ::2] = 255
+        half = numpy.zeros((4096, 4096), numpy.uint8)
+        half[:2048] = 255
+        for name, pixels in (("dots.png", dots), ("half.png", half)):
+            Image.fromarray(pixels).save(self.folder / name)
+            self.assertLess((self.folder / name).stat().st_size, 100_000)
+            self.refused(2, "stats", name, "--cell-size", "5", preexec_fn=lambda: limit_addresses(500 << 20),
+                         says="labelling the clouds of 4096 x 4096 columns takes about 5")
 
     def test_pipes_are_refused(self):
         for name in ("pipe.png", "pipe.nc", "pipe.vdb"):
@@ -320,6 +338,18 @@ class Stats(Case):
             file.createVariable("qi", "f4", ("y", "x"))[:] = 0
         self.refused(3, "stats", "two.nc", "--cell-size", "5",
                      says="two.nc: has several variables: name one with --variable (`variable` of a target) of ql, qi")
+        long, names = "n" * 100_000, [f"q{n}" for n in range(25)]
+        with netcdf_file(self.folder / "many.nc", "w") as file:
+            file.createDimension("y", 4)
+            file.createDimension("x", 5)
+            for variable in (long, *names):
+                file.createVariable(variable, "f4", ("y", "x"))[:] = 0
+        for more in ((), ("--variable", "none")):
+            said = self.refused(3, "stats", "many.nc", "--cell-size", "5", *more,
+                                says="n" * 60 + "..., " + ", ".join(names[:19]) + " and 6 more").stderr
+            self.assertLess(len(said), 500)
+        self.refused(2, "stats", self.netcdf("long.nc", numpy.zeros((1, 1, 4, 4, 5)), (long, "b", "c", "y", "x")),
+                     "--cell-size", "5", says="has 5 dimensions (" + "n" * 60 + "..., b, c, y, x)")
         self.write("text.png", "not a picture")
         self.refused(3, "stats", "text.png", "--cell-size", "5", says="text.png")
         self.call("state", self.scene, "--steps", "1", "--out", "state.vdb")

@@ -118,6 +118,17 @@ direction_deg = 90
         said = self.call("sweep", rolls, "--tracks", "--out", "bad", status=2).stderr
         self.assertIn("has a wind that differs within a level", said)
         self.assertFalse((self.folder / "bad").exists())
+        # The same wind from a file, which is read for that.
+        written = self.write("written.toml", pathlib.Path(rolls).read_text() + "[density]\nwrite_velocity = true\n[frames]\ncount = 1\n")
+        self.call("run", written, "--no-render", "--set", "time.steps=2", "--out", "written")
+        read = self.write("read.toml", NULL + """\
+[[wind_field]]
+kind = "grid"
+grid = "vel"
+files = ["written/density/written_0001.vdb"]
+""")
+        said = self.call("sweep", read, "--tracks", "--out", "bad", status=2).stderr
+        self.assertIn("has a wind that differs within a level", said)
 
     def test_a_run_of_the_table_can_be_repeated(self):
         self.sweep("a", "-j", "2")
@@ -377,6 +388,24 @@ direction_deg = 90
         self.call("merge", "tables", "--overwrite")
         self.assertEqual(len(rows(self.folder / "tables/runs.csv")), 6)
         self.assertFalse((self.folder / "tables/tracks.csv").exists(), "of the plan before")
+
+    def test_links_and_pipes_in_the_folder_are_not_followed(self):
+        victim = self.folder / "victim.txt"
+        for name in ("shards/0000-of-0001.series", "shards/0000-of-0001.jsonl", "shards/lock", "timing.csv"):
+            victim.write_text("of somebody else")
+            link = self.folder / "out" / name
+            link.parent.mkdir(parents=True)
+            link.symlink_to(victim)
+            said = self.sweep("out", status=3).stderr
+            self.assertIn(f"{link.name}: is a link, which is not followed here", said)
+            self.assertEqual(victim.read_text(), "of somebody else")
+            link.unlink()
+            self.sweep("out")
+            self.assertTrue((self.folder / "out/runs.csv").exists())
+            shutil.rmtree(self.folder / "out")
+        (self.folder / "out").mkdir()
+        os.mkfifo(self.folder / "out/timing.csv")
+        self.assertIn("timing.csv: is not a regular file", self.sweep("out", status=3).stderr)
 
     def test_a_shard_that_is_written_is_not_removed(self):
         process = self.started("busy", "--shard", "0/2")

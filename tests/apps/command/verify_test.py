@@ -113,12 +113,41 @@ class Verify(Case):
             (out / "manifest.json").write_text(json.dumps(manifest))
         self.assertEqual(["files", "frames"], damaged(forget))
 
+        def promise(out):
+            manifest = json.loads((out / "manifest.json").read_text())
+            manifest["range"]["last_frame"] = 900_000
+            (out / "manifest.json").write_text(json.dumps(manifest))
+        self.assertIn("frames", damaged(promise))
+        frames = json.loads((self.folder / "whole/manifest.json").read_text())["frames"]
+        self.assertIn(f"frames {frames[-1]['number'] + 1} to 900000 are missing", self.call("verify", "out", status=1).stdout)
+
         def lie(out):
             manifest = json.loads((out / "manifest.json").read_text())
             manifest["frames"][1]["state_hash"] = "0" * 32
             (out / "manifest.json").write_text(json.dumps(manifest))
         self.assertEqual(["metadata"], damaged(lie))
         self.assertIn("replay", self.failed("out", "--replay", 3))
+
+    def test_impossible_numbers_and_paths_of_a_manifest(self):
+        self.call("run", self.scene, "--no-render", "--out", "whole")
+        whole = json.loads((self.folder / "whole/manifest.json").read_text())
+        def refused(change, says):
+            manifest = json.loads(json.dumps(whole))
+            change(manifest)
+            (self.folder / "whole/manifest.json").write_text(json.dumps(manifest))
+            self.assertIn(says, self.call("verify", "whole", status=3).stderr)
+        for number in (2147483647, -2147483648, 10**18, 2**64 - 1, 1e300, 1.5):
+            refused(lambda m: m["range"].update(last_frame=number), f"whole/manifest.json: the frame's number {number}"[:60])
+            refused(lambda m: m["frames"][1].update(number=number), "the frame's number")
+        for path in ("../secret", "/etc/hostname", "density/../../secret", ""):
+            refused(lambda m: m["frames"][1]["files"][0].update(path=path), "which is none of its folder")
+        long = "../" + "x\u001b[2J" * 100_000
+        refused(lambda m: m["frames"][1]["files"][0].update(path=long), "which is none of its folder")
+        self.assertLess(len(self.call("verify", "whole", status=3).stderr), 300)
+        for deep, says in (('{"a":' * 200_000 + "1" + "}" * 200_000, "is nested too deeply"),
+                           ("[" * 200_000 + "]" * 200_000, "is not a manifest")):
+            (self.folder / "whole/manifest.json").write_text('{"x":' + deep + ',"b":0}')
+            self.assertIn(f"whole/manifest.json: {says}", self.call("verify", "whole", status=3).stderr)
 
     def test_against_another_run(self):
         self.call("run", self.scene, "--no-render", "--out", "a")
