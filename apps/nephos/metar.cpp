@@ -108,7 +108,7 @@ int metar(const MetarArguments& a) {
     std::optional<Taf> taf;
     Metar report;
     if (is_taf(text)) {
-        taf = parse_taf(text, a.lenient);
+        taf = parse_taf(text, a.lenient, a.options.date);
         report.text = taf->text;
         report.station = taf->station;
     } else {

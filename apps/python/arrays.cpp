@@ -166,7 +166,13 @@ py::dict clouds_dict(const std::vector<ConnectedCloud>& clouds, const Placement&
     return table;
 }
 
-std::string toml_text(const py::handle& value) {
+namespace {
+
+constexpr int kDeepest = 64;  // lists and dicts in each other
+
+std::string toml_text(const py::handle& value, int depth) {
+    if (depth > kDeepest)
+        throw Error(ErrorCode::usage, "a value holds lists or dicts nested more than 64 deep, or itself");
     if (py::isinstance<py::bool_>(value)) return value.cast<bool>() ? "true" : "false";
     if (py::isinstance<py::int_>(value)) return py::str(value).cast<std::string>();
     if (py::isinstance<py::float_>(value)) {
@@ -180,15 +186,16 @@ std::string toml_text(const py::handle& value) {
         std::string text;
         for (const auto& [key, entry] : py::reinterpret_borrow<py::dict>(value)) {
             text += (text.empty() ? "" : ", ") + quoted(py::str(key).cast<std::string>()) + " = " +
-                    toml_text(entry);
+                    toml_text(entry, depth + 1);
         }
         return "{" + text + "}";
     }
     // Arrays and numbers of NumPy.
-    if (py::hasattr(value, "tolist")) return toml_text(py::object(value.attr("tolist")()));
+    if (py::hasattr(value, "tolist")) return toml_text(py::object(value.attr("tolist")()), depth + 1);
     if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
         std::string text;
-        for (const py::handle& entry : value) text += (text.empty() ? "" : ", ") + toml_text(entry);
+        for (const py::handle& entry : value)
+            text += (text.empty() ? "" : ", ") + toml_text(entry, depth + 1);
         return "[" + text + "]";
     }
     throw Error(
@@ -196,5 +203,9 @@ std::string toml_text(const py::handle& value) {
         fmt::format("a value of type {} cannot stand in a scene; expected a bool, number, text, list or dict",
                     py::str(py::type::of(value).attr("__name__")).cast<std::string>()));
 }
+
+}  // namespace
+
+std::string toml_text(const py::handle& value) { return toml_text(value, 0); }
 
 }  // namespace nephos

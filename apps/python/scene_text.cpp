@@ -18,7 +18,7 @@ SceneText SceneText::from_file(const std::filesystem::path& path) {
         throw Error(error.code(), error.what(), {path.string(), 0, 0});
     }
     scene.label_ = path.string();
-    scene.folder_ = path.parent_path();
+    scene.folder_ = std::filesystem::absolute(path).parent_path();  // whatever the working folder is later
     scene.read();
     return scene;
 }
@@ -27,7 +27,7 @@ SceneText SceneText::from_text(std::string text, const std::filesystem::path& fo
     SceneText scene;
     scene.text_ = std::move(text);
     scene.label_ = "scene";
-    scene.folder_ = folder;
+    scene.folder_ = std::filesystem::absolute(folder);
     scene.read();
     return scene;
 }

@@ -25,7 +25,7 @@ std::string applied(std::string_view text, std::vector<Change> changes) {
     std::string out;
     std::size_t at = 0;
     for (const Change& change : changes) {
-        out += text.substr(at, change.region.begin - at);
+        out += text.substr(at, std::max(at, change.region.begin) - at);
         out += change.by;
         at = std::max(at, change.region.end);
     }
@@ -221,6 +221,19 @@ std::size_t after_comma(std::string_view text, std::size_t end) {
     return next != kNone && text[next] == ',' ? next + 1 : end;
 }
 
+// Where the comma after an element stands when a comment lies between them; otherwise kNone.
+std::size_t comma_behind_comment(std::string_view text, std::size_t end) {
+    bool comment = false;
+    for (std::size_t at = end;;) {
+        at = text.find_first_not_of(" \t\r\n", at);
+        if (at == kNone) return kNone;
+        if (text[at] != '#') return comment && text[at] == ',' ? at : kNone;
+        comment = true;
+        at = text.find('\n', at);
+        if (at == kNone) return kNone;
+    }
+}
+
 // Whether nothing but blanks stands before `at` on its line.
 bool begins_line(std::string_view text, std::size_t at) {
     const std::size_t newline = at == 0 ? kNone : text.rfind('\n', at - 1);
@@ -294,16 +307,35 @@ std::vector<TextRegion> merged(std::string_view text, std::vector<TextRegion> re
 }
 
 std::vector<Change> removed_element(std::string_view text, const TomlNode& array, std::size_t index) {
+    const TextRegion item = array.items[index].value;
+    if (const std::size_t comma = comma_behind_comment(text, item.end); comma != kNone)
+        return {{item, ""}, {{comma, comma + 1}, ""}};  // the comment stays
     std::optional<std::size_t> before, next;
     if (index > 0) before = array.items[index - 1].value.end;
     if (index + 1 < array.items.size()) next = array.items[index + 1].value.begin;
-    return {without_item(text, array.items[index].value, before, next)};
+    return {without_item(text, item, before, next)};
+}
+
+// Keys between braces that follow each other, as one.
+std::vector<TextRegion> with_commas_between(std::string_view text, std::vector<TextRegion> places) {
+    std::ranges::sort(places, {}, &TextRegion::begin);
+    std::vector<TextRegion> out;
+    for (const TextRegion& place : places) {
+        const bool follows =
+            !out.empty() &&
+            text.substr(out.back().end, place.begin - out.back().end).find_first_not_of(" \t,") == kNone;
+        if (follows)
+            out.back().end = place.end;
+        else
+            out.push_back(place);
+    }
+    return out;
 }
 
 // Removes a key between the braces of its table.
 std::vector<Change> removed_in_braces(std::string_view text, const TomlNode& node) {
     std::vector<Change> changes;
-    for (const TextRegion& place : node.places) {
+    for (const TextRegion& place : with_commas_between(text, node.places)) {
         const std::size_t comma = after_comma(text, place.end);
         const std::size_t begin_blank = text.find_last_not_of(" \t", place.begin - 1);
         if (comma > place.end) {
@@ -420,7 +452,7 @@ std::string with_new_element(std::string_view text, const TextPath& array, std::
     const TextRegion last =
         after && *after < node.items.size() ? node.items[*after].value : node.items.back().value;
     const std::size_t comma = after_comma(text, last.end), line = rest_of_line(text, comma);
-    if (!begins_line(text, last.begin) || line == kNone) {
+    if (!begins_line(text, last.begin) || line == kNone || comma_behind_comment(text, last.end) != kNone) {
         return applied(text, {{{last.end, last.end}, ", " + element}});
     }
     const bool has_comma = comma > last.end;
@@ -456,7 +488,8 @@ std::string with_copied_element(std::string_view text, const TextPath& array, st
     }
     const std::string copy(text.substr(item.value.begin, item.value.end - item.value.begin));
     const std::size_t comma = after_comma(text, item.value.end), line = rest_of_line(text, comma);
-    if (!begins_line(text, item.value.begin) || line == kNone) {
+    if (!begins_line(text, item.value.begin) || line == kNone ||
+        comma_behind_comment(text, item.value.end) != kNone) {
         return applied(text, {{{item.value.end, item.value.end}, ", " + copy}});
     }
     const bool has_comma = comma > item.value.end;

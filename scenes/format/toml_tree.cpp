@@ -172,7 +172,7 @@ class TreeBuilder {
         ++at_;
         skip_blanks();
         TomlNode node = parsed_value();
-        at_ = line_end(at_);
+        at_ = after_ = line_end(at_);
         node.places.push_back({begin, at_});
         table.insert_at = at_;
         if (!table.places.empty()) table.places.back().end = at_;
@@ -207,7 +207,7 @@ class TreeBuilder {
         while (begin > 0) {
             const std::size_t above = line_begin(begin - 1);
             const std::size_t first = text_.find_first_not_of(kBlanks, above);
-            if (above >= begin || first == kNone || text_[first] != '#') return begin;
+            if (above >= begin || above < after_ || first == kNone || text_[first] != '#') return begin;
             if (above == 0 || (above == 3 && text_.starts_with("\xEF\xBB\xBF"))) return header;
             begin = above;
         }
@@ -238,13 +238,15 @@ class TreeBuilder {
             to = next;
         }
         to->places.push_back({with_comment_above(header), at_});
+        after_ = at_;
         to->headers.push_back({header, at_});
         to->insert_at = at_;
         return *to;
     }
 
     std::string_view text_;
-    std::size_t at_ = 0;
+    std::size_t at_ = 0,
+                after_ = 0;  // the latter behind the last statement or header: what is above is no comment
     TomlNode root_;
 };
 

@@ -237,6 +237,8 @@ std::string head_text(const std::string& report, const std::string& station, int
                       const MetarSceneOptions& o, const std::string& time) {
     std::string text = "# SPDX-License-Identifier: Apache-2.0\n#\n# " + escaped(report) +
                        "\n#\n# The sky of this report. Heights are above the aerodrome, which is z = 0.\n\n";
+    if (o.name.find_first_of("\"\\") != std::string::npos || escaped(o.name) != o.name)
+        throw Error(ErrorCode::usage, "--name '" + o.name + "': expected letters, digits, `-`, `_` or `.`");
     text += "name = \"" + (o.name.empty() ? station : o.name) + "\"\nseed = " + std::to_string(o.seed) +
             "\n\n[time]\n" + time;
     if (o.place) {

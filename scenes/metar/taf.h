@@ -32,8 +32,10 @@ struct Taf {
 // Returns whether a text begins as a forecast does.
 bool is_taf(std::string_view text);
 
-// Reads a forecast. Throws Error(usage) as parse_metar(), naming the change in which a group is wrong.
-Taf parse_taf(std::string_view text, bool lenient = false);
+// Reads a forecast. `date`: "2024-06" or longer, its month, or empty, when one that goes on into the next month is taken to
+// do so after the last day that it names, which is noted. Throws Error(usage) as parse_metar(), naming the change in which a
+// group is wrong.
+Taf parse_taf(std::string_view text, bool lenient = false, std::string_view date = {});
 
 // A layer of the scene, and the periods in which it is there.
 struct TafLayer {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 
 #include "core/error.h"
 #include "scenes/metar/taf.h"
@@ -49,9 +50,20 @@ bool begins_change(const std::string& word) {
     return word == "BECMG" || word == "TEMPO" || word == "INTER" || word.starts_with("PROB") || is_from(word);
 }
 
+// Of "2024-06" or longer; 0 when it is empty or no month.
+int days_of_month(std::string_view date) {
+    using namespace std::chrono;
+    if (date.size() < 7 || date[4] != '-' || !all_digits(date.substr(0, 4)) || !all_digits(date.substr(5, 2)))
+        return 0;
+    const year_month_day_last last =
+        year(number(date.substr(0, 4))) / month(unsigned(number(date.substr(5, 2)))) / std::chrono::last;
+    return last.ok() ? int(unsigned(last.day())) : 0;
+}
+
 class TafReader {
   public:
-    TafReader(std::string_view text, bool lenient) : words_(words_of(text)), lenient_(lenient) {
+    TafReader(std::string_view text, bool lenient, std::string_view date)
+        : words_(words_of(text)), lenient_(lenient), days_of_month_(days_of_month(date)) {
         taf_.text = joined(words_, 0, words_.size());
     }
 
@@ -103,6 +115,12 @@ class TafReader {
                 last_day_ = std::max({last_day_, number(word.substr(0, 2)), number(word.substr(5, 2))});
             if (is_from(word)) last_day_ = std::max(last_day_, number(word.substr(2, 2)));
         }
+        const bool goes_on = number(valid.substr(5, 2)) < taf_.day;
+        if (days_of_month_ > 0)
+            last_day_ = std::max(days_of_month_, taf_.day);
+        else if (goes_on && last_day_ < 31)
+            taf_.notes.push_back("the month is taken to end on day " + std::to_string(last_day_) +
+                                 ", the last that the forecast names: --date says which month it is");
         taf_.length_s = moment(valid.substr(5), 0);
         if (!is_moment(valid.substr(0, 4)) || taf_.hour > 23 || !is_moment(valid.substr(5)) || taf_.length_s <= 0 ||
             taf_.length_s > 48 * kHour)
@@ -186,7 +204,7 @@ class TafReader {
             period.from_s = moment(begin, 0);
             period.until_s = moment(end, 0);
             ++at_;
-            if (read_overlap(first, period)) return;
+            if (period.until_s > period.from_s && read_overlap(first, period)) return;
         }
         period.change = joined(words_, first, at_);
         if (period.until_s <= period.from_s || period.from_s < before.until_s ||
@@ -236,7 +254,7 @@ class TafReader {
     std::vector<std::string> words_;
     bool lenient_ = false, no_weather_ = false;
     std::size_t at_ = 0;
-    int last_day_ = 0;
+    int last_day_ = 0, days_of_month_ = 0;  // the latter 0: not known
 };
 
 }  // namespace
@@ -246,6 +264,8 @@ bool is_taf(std::string_view text) {
     return !words.empty() && words.front() == "TAF";
 }
 
-Taf parse_taf(std::string_view text, bool lenient) { return TafReader(text, lenient).read(); }
+Taf parse_taf(std::string_view text, bool lenient, std::string_view date) {
+    return TafReader(text, lenient, date).read();
+}
 
 }  // namespace nephos

@@ -121,8 +121,9 @@ std::vector<double> PlotAxis::ticks(int count) const {
         found.clear();
     }
     const double step = round_step(to - from, count);
-    for (double n = std::ceil(from / step - 1e-6); n * step <= to + 1e-6 * step; ++n)
-        found.push_back(n * step);
+    const double first = std::ceil(from / step - 1e-6);
+    for (int n = 0; n <= 2 * count && (first + n) * step <= to + 1e-6 * step; ++n)
+        found.push_back((first + n) * step);
     return found;
 }
 
@@ -149,7 +150,9 @@ PlotAxis axis_over(std::string label, std::span<const double> values, bool log, 
         axis.to = high * margin;
     } else {
         if (zero) low = std::min(low, 0.0);
-        const double margin = high > low ? 0.05 * (high - low) : std::max(0.05 * std::abs(high), 1e-6);
+        // Values that differ by rounding alone are one: there is nothing between them to be drawn.
+        const bool differ = high - low > 1e-12 * std::max(std::abs(low), std::abs(high));
+        const double margin = differ ? 0.05 * (high - low) : std::max(0.05 * std::abs(high), 1e-6);
         axis.from = zero && low == 0 ? 0 : low - margin;
         axis.to = high + margin;
     }

@@ -266,5 +266,42 @@ TEST(TomlEdit, PathsAreReadAndWritten) {
     }
 }
 
+// The comma of an element stands behind its comment, on another line.
+TEST(TomlEdit, CommasBehindCommentsGoWithTheirElement) {
+    const std::string list = "a = [\n  1 # one\n  , 2 # two\n  , 3\n]\n";
+    EXPECT_EQ(without(list, text_path("a[0]")), "a = [\n   # one\n   2 # two\n  , 3\n]\n");
+    EXPECT_EQ(without(list, text_path("a[1]")), "a = [\n  1 # one\n  ,  # two\n   3\n]\n");
+    for (std::size_t n = 0; n < 3; ++n) {
+        const std::string left = without(list, text_path("a[" + std::to_string(n) + "]"));
+        EXPECT_TRUE(is_toml(left)) << left;
+        EXPECT_EQ(find_node(toml_tree(left), text_path("a"))->items.size(), 2u) << left;
+        const std::string copied = with_copied_element(list, text_path("a"), n);
+        EXPECT_TRUE(is_toml(copied)) << copied;
+        EXPECT_EQ(find_node(toml_tree(copied), text_path("a"))->items.size(), 4u) << copied;
+        const std::string more =
+            with_new_element(list, text_path("a"), std::vector<TextEntry>{{"k", "1"}}, n);
+        EXPECT_TRUE(is_toml(more)) << more;
+        EXPECT_EQ(find_node(toml_tree(more), text_path("a"))->items.size(), 4u) << more;
+    }
+}
+
+// The last line of a text of several lines looks like the comment of the section below it.
+TEST(TomlEdit, TheEndOfATextIsNoCommentOfASection) {
+    const std::string text = "name = \"\"\"\n# x\"\"\"\n[time]\nsteps = 3\n";
+    EXPECT_EQ(without(text, text_path("time")), text.substr(0, text.find("[time]")));
+    const std::string below = "name = \"\"\"\n# x\"\"\"\n[time.b]\nsteps = 3\n";
+    const std::string more = with_value(below, text_path("time.c"), "1");
+    EXPECT_TRUE(is_toml(more)) << more;
+    EXPECT_EQ(value_at(more, text_path("name")), value_at(below, text_path("name")));
+}
+
+TEST(TomlEdit, DottedKeysBetweenBracesAreRemovedTogether) {
+    EXPECT_EQ(without("t = { b = 3, a.x = 1, a.y = 2 }\nc = 1\n", text_path("t.a")),
+              "t = { b = 3 }\nc = 1\n");
+    EXPECT_EQ(without("t = { a.x = 1, b = 3, a.y = 2 }\n", text_path("t.a")), "t = { b = 3 }\n");
+    EXPECT_EQ(without("t = { a.x = 1, a.y = 2, b = 3 }\n", text_path("t.a")), "t = { b = 3 }\n");
+    EXPECT_TRUE(is_toml(without("t = { a.x = 1, a.y = 2 }\n", text_path("t.a"))));
+}
+
 }  // namespace
 }  // namespace nephos

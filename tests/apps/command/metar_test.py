@@ -133,9 +133,25 @@ class Metar(Case):
         self.assertEqual(len(found["periods"]), 2)
         self.assertIn("30015KT", found["periods"][1]["weather"])
         self.assertIn("BKN030", found["periods"][1]["weather"])
-        for changes in ("BECMG 2113/2199 BKN030", "BECMG 0013/0016 BKN030", "FM211270 BKN030", "FM219900 BKN030", "BECMG 2115/2113 BKN030"):
+        for changes in ("BECMG 2113/2199 BKN030", "BECMG 0013/0016 BKN030", "FM211270 BKN030", "FM219900 BKN030", "BECMG 2115/2113 BKN030",
+                        "BECMG 2115/2118 BKN030 BECMG 2117/2116 OVC010"):
             self.assertIn("expected", self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, status=2).stderr)
         self.assertIn("expected a validity", self.call("metar", "TAF EGLL 2124/2218 24012KT 9999 FEW020", status=2).stderr)
+
+    def test_forecasts_go_on_into_the_next_month(self):
+        def told(*arguments):
+            return json.loads(self.call("metar", "TAF EGLL 301700Z 3018/0100 24012KT 9999 FEW020", "--explain", "--json", *arguments).stdout)
+        for date, hours in (("2024-06", 6), ("2024-07", 30), ("2024-07-30", 30)):
+            found = told("--date", date)
+            self.assertEqual(found["length_s"], 3600 * hours)
+            self.assertFalse([note for note in found["notes"] if "month" in note])
+        found = told()
+        self.assertEqual(found["length_s"], 3600 * 6)
+        self.assertIn("the month is taken to end on day 30", " ".join(found["notes"]))
+
+    def test_names_that_no_scene_may_have_are_refused(self):
+        for name in ('My "sky"', "a\\b", "a\nb"):
+            self.assertIn("--name", self.call("metar", REAL[0], "--name", name, "-o", "x.toml", status=2).stderr)
 
     def test_another_decoder_agrees(self):
         """Geo::METAR on 300 generated reports: wind, clouds, temperature, pressure."""

@@ -389,6 +389,11 @@ files = ["written/density/written_0001.vdb"]
         self.assertEqual(len(rows(self.folder / "tables/runs.csv")), 6)
         self.assertFalse((self.folder / "tables/tracks.csv").exists(), "of the plan before")
 
+    def test_values_that_differ_by_rounding_have_a_report(self):
+        self.sweep("out", axis="field.background.ext=0.3,0.30000000000000004")
+        self.call("report", "out", "--out", "page.html")
+        self.assertIn("</html>", (self.folder / "page.html").read_text())
+
     def test_links_and_pipes_in_the_folder_are_not_followed(self):
         victim = self.folder / "victim.txt"
         for name in ("shards/0000-of-0001.series", "shards/0000-of-0001.jsonl", "shards/lock", "timing.csv"):

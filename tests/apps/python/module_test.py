@@ -45,6 +45,26 @@ class Scenes(Case):
         self.assertEqual(again.text(), changed.text())
         self.assertEqual(scene.set("name", 'a-b').name, "a-b")
         self.assertIn("enabled = false", scene.set("frames", {"enabled": False, "png": True}).text())
+        endless, deep = [], {}
+        endless.append(endless)
+        for _ in range(200_000):
+            deep = {"a": deep}
+        class Same:
+            def tolist(self):
+                return self
+        for value in (endless, deep, Same()):
+            with self.assertRaisesRegex(nephos.Error, "nested more than 64 deep"):
+                scene.set("lattice.cells", value)
+
+    def test_files_of_a_scene_are_those_beside_it_wherever_python_goes(self):
+        path = pathlib.Path(self.scene)
+        (path.parent / "with-state.toml").write_text(path.read_text().replace("[lattice]", "[lattice]\ninitial_state = \"st.vdb\""))
+        before = os.getcwd()
+        self.addCleanup(os.chdir, before)
+        os.chdir(path.parent)
+        scene = nephos.Scene("with-state.toml")
+        os.chdir("/")
+        self.assertIn(f"{path.parent}/st.vdb", scene.text())
 
     def test_errors_are_those_of_the_command(self):
         path = self.write("bad.toml", BAD)
