@@ -118,7 +118,7 @@ void BlockField::add_with_images(const AutomatonOptions& options, const ActiveEl
     const double x = place((e.centre_m.x - origin.x) / cell, sides.x, extent.x);
     const double y = place((e.centre_m.y - origin.y) / cell, sides.y, extent.y);
     const double z = place((e.centre_m.z - origin.z) / cell, sides.z, extent.z);
-    // Of less than 1e-9 cells as of 1e-9: both miss all cells but those on their plane, and no single precision overflows.
+    // Takes semi-axes below 1e-9 cells as 1e-9: both miss all cells off their plane, and no float overflows.
     const auto in_cells = [&](double semi_axis_m) { return std::max(semi_axis_m / cell, 1e-9); };
     const double a = in_cells(e.semi_axes_m.x), b = in_cells(e.semi_axes_m.y), c = in_cells(e.semi_axes_m.z);
     const Rotation turn = sin_cos_deg(e.yaw_deg);

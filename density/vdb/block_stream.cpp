@@ -43,7 +43,7 @@ class NodeCount {
     using Upper = FloatTree::RootNodeType::ChildNodeType;
     using Lower = Upper::ChildNodeType;
 
-    // Of the node of edge 2^bits; origins lie in 0 .. 2^19.
+    // Returns the key of the node of edge 2^bits around an origin, which lies in 0 .. 2^19.
     static std::uint64_t key(const Coord& origin, unsigned bits) {
         std::uint64_t key = 0;
         for (int a = 0; a < 3; ++a) key = key << 21 | std::uint64_t(origin[a] >> bits);

@@ -157,7 +157,7 @@ void filter_system_calls() {
     // A stack of a thread becomes writable so. Private memory alone is mapped now, but for what nobody can write.
     check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(mprotect), 1,
                              SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0)));
-    // What allocators give back and ask for, and nothing that reaches the file behind a mapping, as MADV_REMOVE does.
+    // Allows the advice of allocators, and none that reaches the file behind a mapping, as MADV_REMOVE does.
     for (const int advice : {MADV_DONTNEED, MADV_FREE, MADV_HUGEPAGE, MADV_NOHUGEPAGE})
         check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(madvise), 1,
                                  SCMP_A2(SCMP_CMP_EQ, scmp_datum_t(advice))));

@@ -34,11 +34,11 @@ std::string advice_on_missing_file(const fs::path& path, const fs::path& request
 }
 
 constexpr std::size_t kMostFiles = 1000;
-// Of all files, each counted as often as it is named.
+// Limits the bytes of all files together, each counted as often as it is named.
 constexpr std::size_t kMostBytes = std::size_t(64) << 20;
 constexpr std::size_t kMostAdvised = 20;  // looking for similar names takes long in a large folder
 
-// What a file has for whoever names it.
+// Holds what was read from a file, for each item that names it.
 struct ModelFile {
     std::size_t bytes = 0;
     std::vector<Node> models;

@@ -221,7 +221,7 @@ std::size_t after_comma(std::string_view text, std::size_t end) {
     return next != kNone && text[next] == ',' ? next + 1 : end;
 }
 
-// Where the comma after an element stands when a comment lies between them; otherwise kNone.
+// Returns the offset of the comma after an element when a comment lies between them; otherwise kNone.
 std::size_t comma_behind_comment(std::string_view text, std::size_t end) {
     bool comment = false;
     for (std::size_t at = end;;) {
@@ -287,16 +287,16 @@ TextRegion with_blank_lines(std::string_view text, TextRegion region) {
     return region;
 }
 
-// Regions in the order of the text; those with only blank lines between them as one.
-std::vector<TextRegion> merged(std::string_view text, std::vector<TextRegion> regions) {
+// Returns the regions in the order of the text; those with only characters of `between` between them as one.
+std::vector<TextRegion> merged(std::string_view text, std::vector<TextRegion> regions,
+                               std::string_view between = " \t\r\n") {
     std::ranges::sort(regions, {}, &TextRegion::begin);
     std::vector<TextRegion> out;
     for (const TextRegion& region : regions) {
         const bool joins =
             !out.empty() &&
             (region.begin <= out.back().end ||
-             text.substr(out.back().end, region.begin - out.back().end).find_first_not_of(" \t\r\n") ==
-                 kNone);
+             text.substr(out.back().end, region.begin - out.back().end).find_first_not_of(between) == kNone);
         if (joins) {
             out.back().end = std::max(out.back().end, region.end);
         } else {
@@ -316,26 +316,10 @@ std::vector<Change> removed_element(std::string_view text, const TomlNode& array
     return {without_item(text, item, before, next)};
 }
 
-// Keys between braces that follow each other, as one.
-std::vector<TextRegion> with_commas_between(std::string_view text, std::vector<TextRegion> places) {
-    std::ranges::sort(places, {}, &TextRegion::begin);
-    std::vector<TextRegion> out;
-    for (const TextRegion& place : places) {
-        const bool follows =
-            !out.empty() &&
-            text.substr(out.back().end, place.begin - out.back().end).find_first_not_of(" \t,") == kNone;
-        if (follows)
-            out.back().end = place.end;
-        else
-            out.push_back(place);
-    }
-    return out;
-}
-
 // Removes a key between the braces of its table.
 std::vector<Change> removed_in_braces(std::string_view text, const TomlNode& node) {
     std::vector<Change> changes;
-    for (const TextRegion& place : with_commas_between(text, node.places)) {
+    for (const TextRegion& place : merged(text, node.places, " \t,")) {
         const std::size_t comma = after_comma(text, place.end);
         const std::size_t begin_blank = text.find_last_not_of(" \t", place.begin - 1);
         if (comma > place.end) {

@@ -50,7 +50,7 @@ bool begins_change(const std::string& word) {
     return word == "BECMG" || word == "TEMPO" || word == "INTER" || word.starts_with("PROB") || is_from(word);
 }
 
-// Of "2024-06" or longer; 0 when it is empty or no month.
+// Returns the number of days of the month in "2024-06" or longer; 0 when it is empty or no month.
 int days_of_month(std::string_view date) {
     using namespace std::chrono;
     if (date.size() < 7 || date[4] != '-' || !all_digits(date.substr(0, 4)) || !all_digits(date.substr(5, 2)))
