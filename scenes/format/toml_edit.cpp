@@ -106,14 +106,14 @@ std::size_t below_first_comment(std::string_view text, std::size_t at) {
     return at;
 }
 
-// All sections of a node and of those within it; none when it has none.
+// Collects all sections of a node and of those within it, also of those below its dotted keys.
 void collect_places(const TomlNode& node, bool headers_only, std::vector<TextRegion>& out) {
     if (node.form == Form::section) {
         const auto& own = headers_only ? node.headers : node.places;
         out.insert(out.end(), own.begin(), own.end());
     }
     for (const auto& [name, entry] : node.entries) {
-        if (entry.form == Form::section || entry.form == Form::sections)
+        if (entry.form == Form::section || entry.form == Form::sections || entry.form == Form::dotted)
             collect_places(entry, headers_only, out);
     }
     if (node.form == Form::sections) {
@@ -263,7 +263,7 @@ Change without_item(std::string_view text, const TextRegion& item, std::optional
     }
     const bool same_line =
         end_before && text.substr(*end_before, item.begin - *end_before).find_first_of("\n#") == kNone;
-    return {{same_line ? *end_before : item.begin, item.end}, ""};
+    return {{same_line ? *end_before : item.begin, same_line ? item.end : comma}, ""};
 }
 
 // Removes the blank lines, too, that follow what is removed where a blank line or the text's start is before it.
@@ -396,13 +396,11 @@ std::string without(std::string_view text, const TextPath& path) {
     const TomlNode& parent = *find_node(root, above);
     if (parent.form == Form::array) return applied(text, removed_element(text, parent, path.back().index));
     std::vector<Change> changes;
-    if (node->form == Form::section || node->form == Form::sections) {
-        std::vector<TextRegion> places;
-        collect_places(*node, false, places);
-        for (const TextRegion& place : merged(text, places))
-            changes.push_back({with_blank_lines(text, place), ""});
-        return applied(text, changes);
-    }
+    std::vector<TextRegion> sections;
+    collect_places(*node, false, sections);
+    for (const TextRegion& section : merged(text, sections))
+        changes.push_back({with_blank_lines(text, section), ""});
+    if (node->form == Form::section || node->form == Form::sections) return applied(text, changes);
     const bool braces = parent.form == Form::inlined || parent.in_braces || node->in_braces;
     if (braces) return applied(text, removed_in_braces(text, *node));
     for (const TextRegion& place : node->places) changes.push_back({place, ""});

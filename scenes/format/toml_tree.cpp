@@ -10,7 +10,11 @@ namespace {
 constexpr std::string_view kBlanks = " \t";
 constexpr std::size_t kNone = std::string_view::npos;
 
-using Names = std::vector<std::string>;
+// One part of a key: without its quotes, and as it stands.
+struct KeyPart {
+    std::string name, text;
+};
+using Names = std::vector<KeyPart>;
 
 class TreeBuilder {
   public:
@@ -78,12 +82,13 @@ class TreeBuilder {
         }
     }
 
-    // One part of a key, without its quotes. Escapes in quoted keys stay as they are: no key of a scene has any.
-    std::string key_part() {
+    // Reads one part of a key. Escapes in quoted keys stay as they are: no key of a scene has any.
+    KeyPart key_part() {
         const std::size_t begin = at_;
         if (peek() == '"' || peek() == '\'') {
             skip_string();
-            return std::string(text_.substr(begin + 1, at_ - begin - 2));
+            return {std::string(text_.substr(begin + 1, at_ - begin - 2)),
+                    std::string(text_.substr(begin, at_ - begin))};
         }
         while (!at_end()) {
             const char c = text_[at_];
@@ -91,7 +96,8 @@ class TreeBuilder {
             if (!letter && c != '_' && c != '-') break;
             ++at_;
         }
-        return std::string(text_.substr(begin, at_ - begin));
+        const std::string name(text_.substr(begin, at_ - begin));
+        return {name, name};
     }
 
     Names key() {
@@ -186,10 +192,10 @@ class TreeBuilder {
         TomlNode* to = &table;
         std::string prefix;
         for (std::size_t n = 0; n + 1 < names.size(); ++n) {
-            prefix += names[n] + ".";
-            TomlNode* next = to->find(names[n]);
+            prefix += names[n].text + ".";
+            TomlNode* next = to->find(names[n].name);
             if (next == nullptr) {
-                next = &to->entries.emplace_back(TomlEntry{names[n], {}}).value;
+                next = &to->entries.emplace_back(TomlEntry{names[n].name, {}}).value;
                 next->form = TomlNode::Form::dotted;
                 next->prefix = prefix;
                 next->in_braces = in_braces;
@@ -198,7 +204,7 @@ class TreeBuilder {
             next->insert_at = after;
             to = next;
         }
-        to->entries.push_back({names.back(), std::move(node)});
+        to->entries.push_back({names.back().name, std::move(node)});
     }
 
     // Where the comment directly above a header begins; one at the start of the file is the file's own.
@@ -223,9 +229,9 @@ class TreeBuilder {
         TomlNode* to = &root_;
         for (std::size_t n = 0; n < names.size(); ++n) {
             const bool last = n + 1 == names.size();
-            TomlNode* next = to->find(names[n]);
+            TomlNode* next = to->find(names[n].name);
             if (next == nullptr) {
-                next = &to->entries.emplace_back(TomlEntry{names[n], {}}).value;
+                next = &to->entries.emplace_back(TomlEntry{names[n].name, {}}).value;
                 next->form = last && element ? TomlNode::Form::sections : TomlNode::Form::section;
             }
             if (next->form == TomlNode::Form::sections || next->form == TomlNode::Form::array) {

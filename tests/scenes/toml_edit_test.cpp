@@ -303,5 +303,35 @@ TEST(TomlEdit, DottedKeysBetweenBracesAreRemovedTogether) {
     EXPECT_TRUE(is_toml(without("t = { a.x = 1, a.y = 2 }\n", text_path("t.a"))));
 }
 
+// The comma behind the last element must not be left alone.
+TEST(TomlEdit, CommasBehindTheLastElementGoWithIt) {
+    EXPECT_EQ(without("v = [1,]\n", text_path("v[0]")), "v = []\n");
+    EXPECT_EQ(without("v = [1,\n  2,]\n", text_path("v[1]")), "v = [1,\n  ]\n");
+    EXPECT_EQ(without("v = [1, 2,]\n", text_path("v[1]")), "v = [1,]\n");
+    EXPECT_EQ(without("v = [{ x = 1 }, # c\n]\n", text_path("v[0]")), "v = [ # c\n]\n");
+    EXPECT_EQ(without("v = [\n  { a = 1 },\n  { a = 2 }, ]\n", text_path("v[1]")),
+              "v = [\n  { a = 1 },\n   ]\n");
+}
+
+TEST(TomlEdit, SectionsBelowDottedKeysBelongToTheirTable) {
+    const std::string one = "[[layer]]\nrain.on = true\n[[layer.rain.placed]]\nx_m = 0\n",
+                      two = "[[layer]]\nname = \"high\"\n";
+    EXPECT_EQ(without(one + two, text_path("layer[0]")), two);
+    EXPECT_EQ(without(one + two, text_path("layer[0].rain")), "[[layer]]\n" + two);
+    for (const std::string& more :
+         {with_copied_element(one + two, text_path("layer"), 0),
+          with_new_element(one + two, text_path("layer"), std::vector<TextEntry>{{"k", "1"}}, 0)}) {
+        ASSERT_TRUE(is_toml(more)) << more;
+        const TomlNode tree = toml_tree(more);
+        ASSERT_EQ(find_node(tree, text_path("layer"))->items.size(), 3u) << more;
+        EXPECT_NE(find_node(tree, text_path("layer[0].rain.placed[0].x_m")), nullptr) << more;
+        EXPECT_EQ(value_at(more, text_path("layer[2].name")), "\"high\"") << more;
+    }
+}
+
+TEST(TomlEdit, KeysThatAreAddedToDottedOnesKeepTheirQuotes) {
+    EXPECT_EQ(with_value("\"a b\".x = 1\n", {{"a b", 0}, {"n", 0}}, "2"), "\"a b\".x = 1\n\"a b\".n = 2\n");
+}
+
 }  // namespace
 }  // namespace nephos
