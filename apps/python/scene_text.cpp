@@ -27,7 +27,10 @@ SceneText SceneText::from_text(std::string text, const std::filesystem::path& fo
     SceneText scene;
     scene.text_ = std::move(text);
     scene.label_ = "scene";
-    scene.folder_ = std::filesystem::absolute(folder);
+    // Without a working folder it stays as it is: only scenes that name files need it.
+    std::error_code error;
+    scene.folder_ = std::filesystem::absolute(folder.empty() ? "." : folder, error);
+    if (error) scene.folder_ = folder;
     scene.read();
     return scene;
 }

@@ -4,6 +4,7 @@
 #include <map>
 #include <system_error>
 
+#include "core/descriptor.h"
 #include "scenes/format/document.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/schema_sections.h"
@@ -35,7 +36,7 @@ std::string advice_on_missing_file(const fs::path& path, const fs::path& request
 
 constexpr std::size_t kMostFiles = 1000;
 // Limits the bytes of all files together, each counted as often as it is named.
-constexpr std::size_t kMostBytes = std::size_t(64) << 20;
+constexpr std::size_t kMostBytes = kMaxSceneBytes;
 constexpr std::size_t kMostAdvised = 20;  // looking for similar names takes long in a large folder
 
 // Holds what was read from a file, for each item that names it.
@@ -82,6 +83,7 @@ class ModelFiles {
     ModelFile read(const fs::path& path, const fs::path& requested) {
         std::string text;
         try {
+            require_regular_file(path);
             text = read_text_file(path, kMaxSceneBytes);
         } catch (const Error& error) {
             return {0,

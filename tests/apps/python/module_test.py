@@ -41,6 +41,7 @@ class Scenes(Case):
         self.assertIn("cells = [32, 24, 12]", scene.text())
         self.assertEqual(scene, scene.set("field.background.ext", 0.5).set("field.background.ext", numpy.float64(0.05)))
         again = nephos.Scene.from_text(changed.text())
+        self.assertEqual(nephos.Scene.from_text(changed.text(), folder="").text(), again.text())
         self.assertEqual(again, changed)
         self.assertEqual(again.text(), changed.text())
         self.assertEqual(scene.set("name", 'a-b').name, "a-b")
