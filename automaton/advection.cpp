@@ -7,6 +7,9 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "core/error.h"
+#include "core/text.h"
+
 namespace nephos {
 namespace {
 
@@ -51,6 +54,12 @@ Displacement displacement_of_layer(const AutomatonOptions& options, int k, doubl
     Vec3 place = options.placement.origin_m;  // anywhere in the layer
     place.z += (k + 0.5) * options.placement.cell_size_m;
     const Vec3 wind = wind_at(options.wind, place, time_s);
+    // Winds of files are known only now: key frames were checked with the options.
+    const double cells =
+        std::max(std::abs(wind.x), std::abs(wind.y)) * options.time_step_s / options.placement.cell_size_m;
+    if (!(cells <= kMaxCellsOfStep))
+        throw Error(ErrorCode::usage, "wind moves the air by " + number_text(cells, 6) +
+                                          " cells in one step; at most 2^24 cells are possible");
     return displacement_of_step({wind.x, wind.y}, options.time_step_s, options.placement.cell_size_m);
 }
 

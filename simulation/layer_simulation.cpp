@@ -242,17 +242,18 @@ std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string&
                                 "`initial_state` in the `lattice` of its layer",
                                 scene_file));
     }
+    const Scene complete = with_files(scene);
     std::size_t bytes = 0;
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {
         if (!scene.layers.empty() && scene.layers[n].is_veil) continue;  // holds nothing
-        bytes += Automaton::memory_bytes(automaton_options(scene, n));
+        bytes += Automaton::memory_bytes(automaton_options(complete, n));
     }
     const Extent& extent = scene.automaton.extent;
     require_memory(bytes, scene.layers.empty()
                               ? fmt::format("{}: a lattice of {} x {} x {} cells", scene_file, extent.x,
                                             extent.y, extent.z)
                               : fmt::format("{}: {} layers", scene_file, scene.layers.size()));
-    return make_layers(scene, initial_state(scene, from));
+    return make_layers(complete, initial_state(complete, from));
 }
 
 StateHash combined_hash(std::span<const StateHash> hashes) {

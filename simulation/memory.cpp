@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "simulation/frame_output.h"
+#include "simulation/scene_files.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -224,7 +225,10 @@ std::size_t memory_estimate_bytes(const Scene& scene, RunParts parts) {
 }
 
 void check_memory(const Scene& scene, const AvailableMemory& available, RunParts parts) {
-    const MemoryEstimate estimate = memory_estimate(scene, parts);
+    MemoryEstimate estimate = memory_estimate(scene, parts);
+    if (estimate.total() <= available.bytes) return;
+    // Winds that are a profile take less, which only their files tell.
+    if (!scene.automaton.wind.fields.empty()) estimate = memory_estimate(with_files(scene), parts);
     if (estimate.total() <= available.bytes) return;
     const Extent& extent = scene.automaton.extent;
     const auto text = [](int number) { return std::to_string(number); };

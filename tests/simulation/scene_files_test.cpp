@@ -22,6 +22,7 @@
 #include "simulation/billboard_files.h"
 #include "simulation/frame_writer.h"
 #include "simulation/layer_simulation.h"
+#include "simulation/memory.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -83,6 +84,39 @@ TEST_F(SceneFiles, VelocitiesMoveTheCells) {
     EXPECT_EQ(wind_at(loaded.automaton.wind, Vec3(1000, 500, 300), 0).x, 3.75 * 0.5 + 3.75 * 0.5);
     EXPECT_NE(simulation_start(even).simulation_hash, simulation_start(uneven).simulation_hash)
         << "what is in the file belongs to the simulation";
+}
+
+// Cells have motions of their own, and memory for them, only where the wind of the files is no profile.
+TEST_F(SceneFiles, WindsThatAreProfilesTakeNoMemoryForMotions) {
+    write<openvdb::Vec3SGrid>("even.vdb", "wind", {3.75f, 0, 0}, {3.75f, 0, 0});
+    write<openvdb::Vec3SGrid>("uneven.vdb", "wind", {3.75f, 0, 0}, {0, 2, 1});
+    const std::string wind = "[[wind_field]]\nkind = \"grid\"\nfiles = ";
+    const Scene even = read(wind + "\"even.vdb\"\n"), uneven = read(wind + "\"uneven.vdb\"\n");
+    const std::size_t enough = memory_estimate_bytes(with_files(even), RunParts::statistics);
+    EXPECT_GT(memory_estimate_bytes(even, RunParts::statistics), enough) << "nobody knows yet";
+    EXPECT_NO_THROW(check_memory(even, {enough, "limit"}, RunParts::statistics));
+    EXPECT_THROW(check_memory(even, {enough - 1, "limit"}, RunParts::statistics), Error);
+    EXPECT_THROW(check_memory(uneven, {enough, "limit"}, RunParts::statistics), Error);
+}
+
+// As of key frames: further, and sums over the steps of a frame would not fit.
+TEST_F(SceneFiles, WindsThatMoveTheAirTooFarAreRefused) {
+    write<openvdb::Vec3SGrid>("storm.vdb", "wind", {200.f, 0, 0}, {200.f, 0, 0});
+    const std::string wind =
+        "cell_size_m = 1\n" + field_ +
+        "[[wind_field]]\nkind = \"grid\"\nfiles = \"storm.vdb\"\n[frames]\ncount = 1\n[time]\nstep_s = ";
+    const double step_s = kMaxCellsOfStep / 200;
+    const auto hash = [&](double seconds) {
+        return hash_after(read(wind + std::to_string(seconds) + "\n"), 1);
+    };
+    EXPECT_NO_THROW(hash(0.99 * step_s));
+    try {
+        hash(1.01 * step_s);
+        FAIL() << "an error was expected";
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("at most 2^24 cells are possible"), std::string::npos)
+            << error.what();
+    }
 }
 
 TEST_F(SceneFiles, ASequenceIsLinearInTime) {
