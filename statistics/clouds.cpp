@@ -214,7 +214,7 @@ class Labelling {
     std::uint32_t clouds_ = 0;
 };
 
-// Sums of positions, of a cloud of several runs.
+// Holds sums of positions, of a cloud of several cells.
 struct Sums {
     std::uint32_t cloud;
     std::array<double, 2> x{}, y{}, z{};
@@ -228,7 +228,9 @@ class Centroids {
           x_(extent.x, is_periodic(boundaries.x)),
           y_(extent.y, is_periodic(boundaries.y)),
           z_(extent.z, is_periodic(boundaries.z)),
-          place_(clouds, kNone) {}
+          place_(clouds, kNone) {
+        sums_.reserve(clouds);  // at once: growing takes three times as much, and clouds_2d_bytes() counts it
+    }
 
     // All of a cloud of one cell.
     void put_cell(ConnectedCloud& cloud, int i, int j, int k) {
@@ -346,10 +348,10 @@ std::uint64_t count_shadow_runs(const BitPlaneView& cld) {
 
 std::size_t clouds_2d_bytes(const Extent& extent, std::uint64_t runs) {
     // Root, faces and cloud of a run, the run, and what it shares with the row beside it, with room for twice as many; then
-    // those of clouds, of which those of several runs have sums. Less is alive in organisation().
+    // those of clouds, of which those of several cells have sums. Less is alive in organisation().
     constexpr std::size_t kOfRun = 3 * sizeof(std::uint32_t) + sizeof(CellRun) + 2 * sizeof(RunOverlap),
                           kOfCloud = sizeof(ConnectedCloud) + sizeof(std::uint8_t) +
-                                     2 * sizeof(std::uint32_t) + sizeof(Sums) / 2;
+                                     2 * sizeof(std::uint32_t) + sizeof(Sums);
     // The shadow, its first cells of runs, and the runs before each word.
     const std::size_t plane = BitPlane::bytes({extent.x, extent.y, 1});
     return plane * 2 + plane / 2 + std::size_t(extent.y) * sizeof(std::uint32_t) +

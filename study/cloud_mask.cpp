@@ -62,8 +62,11 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
     if (options.cell_size_m || options.level_height_m)
         fail(ErrorCode::usage, path,
              fmt::format("has voxels of {} m itself: leave out the size of cells and levels", size));
-    const std::vector<float> values = grid.to_dense();
     const Extent extent = grid.extent();
+    require_memory(std::size_t(extent.cells()) * sizeof(float) + BitPlane::bytes(extent),
+                   fmt::format("{}: the box of {} x {} x {} voxels around its grid", path.string(), extent.x,
+                               extent.y, extent.z));
+    const std::vector<float> values = grid.to_dense();
     CloudMasks masks{{}, size, size, grid.placement().origin_m.z, options.boundaries, false, 0, {}};
     masks.snapshots.push_back(plane_of(extent, options.threshold.value_or(0), [&](int i, int j, int k) {
         return double(values[linear_index(extent, i, j, k)]);
@@ -188,9 +191,9 @@ SeriesMean mean_of(const std::vector<double>& values) {
 }
 
 // Throws Error(usage) where the clouds of a shadow of so many runs take more memory than there is.
-void require_memory_of_clouds(const Extent& extent, std::uint64_t runs) {
-    require_memory(clouds_2d_bytes(extent, runs),
-                   fmt::format("labelling the clouds of {} x {} columns", extent.x, extent.y));
+void require_memory_of_clouds(const CloudMasks& masks, const Extent& extent, std::uint64_t runs) {
+    require_memory(clouds_2d_bytes(extent, runs), fmt::format("{}: labelling the clouds of {} x {} columns",
+                                                              masks.files, extent.x, extent.y));
 }
 
 // Runs of a random shadow: one begins where a covered column follows a clear one, or begins a row. Few have more.
@@ -272,6 +275,8 @@ CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const Mas
     }
     if (all.snapshots.empty()) throw Error(ErrorCode::usage, "no cloud mask is named");
     all.notes = notes.texts();
+    all.files =
+        paths.front().string() + (paths.size() > 1 ? fmt::format(" and {} more", paths.size() - 1) : "");
     return all;
 }
 
@@ -286,7 +291,7 @@ MaskStatistics mask_statistics(const CloudMasks& masks) {
         series[statistic_index(name)].push_back(value);
     };
     for (const BitPlane& plane : masks.snapshots) {
-        require_memory_of_clouds(extent, count_shadow_runs(plane.view()));
+        require_memory_of_clouds(masks, extent, count_shadow_runs(plane.view()));
         const CloudCounts counts = count_cloud(plane.view(), masks.boundaries);
         const CloudStatistics s = cloud_statistics(counts, levels);
         put("cover", s.cover);
@@ -312,7 +317,7 @@ MaskStatistics mask_statistics(const CloudMasks& masks) {
         result.statistics[statistic_index(name)] = size_statistic(name, sizes);
     result.organisation = sums.mean();
     const double cover = result.statistics[statistic_index("cover")].mean;
-    require_memory_of_clouds(extent, runs_of_random_shadow(extent, cover));
+    require_memory_of_clouds(masks, extent, runs_of_random_shadow(extent, cover));
     result.random = null_organisation(extent, masks.boundaries, cover, kNullDraws, kNullSeed);
     return result;
 }

@@ -44,6 +44,7 @@ struct CloudMasks {
     std::uint64_t missing = 0;     // values of all snapshots that are missing, and count as clear
     // Each with the file, or the first of several, that it is about: missing values, dimensions taken by their places.
     std::vector<std::string> notes;
+    std::string files = {};  // that they are of, for messages: "a.nc", "a.nc and 3 more"
 };
 
 // Returns whether a statistic has no value in a view from above.

@@ -359,6 +359,16 @@ Reader opened(const std::filesystem::path& path) {
     return {path, read_beginning(path, error ? 4096 : std::size_t(file_bytes))};
 }
 
+// Reads how many dimensions or variables follow. Throws Error(io) where they are more than memory is taken for.
+std::uint64_t checked_count(Reader& reader, const char* what, const std::filesystem::path& path) {
+    constexpr std::uint64_t kMost = 100'000;
+    const std::uint64_t count = reader.count();
+    if (count > kMost)
+        throw Error(ErrorCode::io,
+                    fmt::format("{}: has {} {}; at most {} can be read", path.string(), count, what, kMost));
+    return count;
+}
+
 // The one of that name; without a name the only one with two dimensions or more.
 const FoundVariable& variable_named(const std::vector<FoundVariable>& variables, const std::string& name,
                                     const std::filesystem::path& path) {
@@ -439,7 +449,7 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
     const std::uint64_t records = reader.count();
     std::vector<NetcdfDimension> dimensions;
     reader.next<std::uint32_t>();
-    for (std::uint64_t left = reader.count(); left > 0; --left) {
+    for (std::uint64_t left = checked_count(reader, "dimensions", path); left > 0; --left) {
         std::string dimension = reader.name();
         dimensions.push_back({std::move(dimension), reader.count()});
     }
@@ -447,7 +457,7 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
     reader.next<std::uint32_t>();
     std::vector<FoundVariable> variables;
     std::uint64_t record_bytes = 0, record_variables = 0;
-    for (std::uint64_t left = reader.count(); left > 0; --left) {
+    for (std::uint64_t left = checked_count(reader, "variables", path); left > 0; --left) {
         FoundVariable& variable = variables.emplace_back();
         variable.name = reader.name();
         const std::uint64_t rank = reader.count();
@@ -476,8 +486,12 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
     for (std::size_t n = 0; n < found->dimensions.size(); ++n) {
         const NetcdfDimension& dimension = dimensions[found->dimensions[n]];
         const std::uint64_t size = dimension.size == 0 ? records : dimension.size;
+        // Those of more dimensions are no mask, and nobody asks for their coordinates.
+        constexpr std::size_t kMostOfMask = 4;  // time, z, y, x
         data.axes.push_back(
-            axis_of(reader, variables, found->dimensions[n], {dimension.name, dimension.size}, path));
+            found->dimensions.size() > kMostOfMask
+                ? NetcdfAxis{dimension.name, size, {}, {}, {}, {}, {}, {}}
+                : axis_of(reader, variables, found->dimensions[n], {dimension.name, dimension.size}, path));
         data.axes.back().size = size;
         if (size == 0 || count > reader.size() / size)
             throw Error(ErrorCode::io, path.string() + ": is damaged or empty");

@@ -4,6 +4,7 @@
 import json
 import math
 import os
+import resource
 import struct
 import subprocess
 import sys
@@ -273,7 +274,42 @@ class Stats(Case):
             Image.fromarray(pixels).save(self.folder / name)
             self.assertLess((self.folder / name).stat().st_size, 100_000)
             self.refused(2, "stats", name, "--cell-size", "5", preexec_fn=lambda: limit_addresses(500 << 20),
-                         says="labelling the clouds of 4096 x 4096 columns takes about 5")
+                         says=f"{name}: labelling the clouds of 4096 x 4096 columns takes about 6")
+        # Runs of two columns have sums of places each, which single ones lack.
+        pairs = numpy.zeros((1024, 1024), numpy.uint8)
+        pairs[::2, ::3] = pairs[::2, 1::3] = 255
+        Image.fromarray(pairs).save(self.folder / "pairs.png")
+        self.refused(2, "stats", "pairs.png", "--cell-size", "5", preexec_fn=lambda: limit_addresses(45 << 20),
+                     says="pairs.png: labelling the clouds of 1024 x 1024 columns takes about 37.8 MiB")
+        self.call("stats", "pairs.png", "--cell-size", "5", preexec_fn=lambda: limit_addresses(56 << 20))
+
+    def test_a_grid_of_far_voxels_is_refused_where_its_box_does_not_fit(self):
+        import pyopenvdb
+        grid = pyopenvdb.FloatGrid()
+        grid.name = "density"
+        accessor = grid.getAccessor()
+        for place in ((0, 0, 0), (900, 900, 900)):
+            accessor.setValueOn(place, 1.0)
+        pyopenvdb.write(str(self.folder / "far.vdb"), [grid])
+        self.refused(2, "stats", "far.vdb", preexec_fn=lambda: limit_addresses(2500 << 20),
+                     says="far.vdb: the box of 901 x 901 x 901 voxels around its grid takes about 2.")
+
+    def test_heads_of_netcdf_are_read_once_and_limited(self):
+        """A head of CDF-1 with a variable of 1,024 times the same dimension, whose coordinate has many attributes; one of more
+        variables than anybody writes."""
+        def number(n):
+            return n.to_bytes(4, "big")
+        def name(text):
+            return number(len(text)) + text.encode() + bytes(-len(text) % 4)
+        attributes = number(0xC) + number(150_000) + (name("") + number(2) + number(0)) * 150_000
+        head = b"CDF\x01" + number(0) + number(0xA) + number(1) + name("x") + number(1) + number(0) * 2
+        variables = [name("x") + number(1) + number(0) + attributes + number(5) + number(4) + number(0),
+                     name("v") + number(1024) + number(0) * 1024 + number(0) * 2 + number(5) + number(4) + number(0)]
+        (self.folder / "many.nc").write_bytes(head + number(0xB) + number(2) + b"".join(variables))
+        self.refused(2, "stats", "many.nc", "--variable", "v", "--cell-size", "5", says="dimensions",
+                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (2, 2)))
+        (self.folder / "wide.nc").write_bytes(head + number(0xB) + number(100_001) + variables[1] * 3)
+        self.refused(3, "stats", "wide.nc", "--cell-size", "5", says="wide.nc: has 100001 variables; at most 100000 can be read")
 
     def test_pipes_are_refused(self):
         for name in ("pipe.png", "pipe.nc", "pipe.vdb"):
