@@ -13,6 +13,7 @@
 
 #include "core/error.h"
 #include "scenes/format/writer.h"
+#include "simulation/checked_json.h"
 
 namespace nephos {
 namespace {
@@ -70,13 +71,15 @@ double number_of(const std::string& text) {
     return number;
 }
 
-// The steps of the scene of the run that is in the folder; 0 where there is none. What else is wrong with the manifest is
-// found when the run is resumed.
+// Returns the steps of the scene of the run that is in the folder; 0 where there is none. Throws Error(io) where the
+// manifest cannot be read; what else is wrong with it is found when the run is resumed.
 std::uint64_t steps_before(const RunSettings& settings) {
-    std::ifstream stream(RunFolder{settings.folder, settings.scene.name}.manifest());
-    nlohmann::json json = nlohmann::json::parse(stream, nullptr, false);
+    const std::filesystem::path manifest = RunFolder{settings.folder, settings.scene.name}.manifest();
+    std::error_code error;
+    if (!std::filesystem::exists(std::filesystem::symlink_status(manifest, error))) return 0;
+    nlohmann::ordered_json json = parsed_json(manifest, JsonLists::left_out);
     if (!json.is_object() || !json.contains("scene") || !json["scene"].is_object()) return 0;
-    const nlohmann::json& steps = json["scene"]["steps"];
+    const nlohmann::ordered_json& steps = json["scene"]["steps"];
     return steps.is_number_unsigned() ? steps.get<std::uint64_t>() : 0;
 }
 

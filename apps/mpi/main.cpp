@@ -114,8 +114,9 @@ int parse(CLI::App& app, int argc, char** argv, Arguments& a) {
         ->expected(1)
         ->allow_extra_args(false)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    app.add_option("--seed", a.seed, "Seed instead of the scene's");
-    app.add_option("--steps", a.steps, "Steps instead of the scene's time.steps");
+    app.add_option("--seed", a.seed, "Seed instead of the scene's")->check(CLI::NonNegativeNumber);
+    app.add_option("--steps", a.steps, "Steps instead of the scene's time.steps")
+        ->check(CLI::NonNegativeNumber);
     app.add_flag("--hash", a.hash, "Print the state hash after every step, as `nephos hash` does");
     app.add_option("-o,--out", a.out, "Folder for statistics.csv, with a row a step");
     app.add_flag("--write-state", a.write_state,

@@ -32,6 +32,10 @@ struct HashArguments {
 // The lines of a file, to compare with; blank lines and comments (#) left out.
 std::vector<std::string> expected_lines(const std::string& path) {
     if (is_named_pipe(path)) throw Error(ErrorCode::io, path + ": is a named pipe");
+    std::error_code error;
+    const std::filesystem::file_status status = std::filesystem::status(path, error);
+    if (std::filesystem::is_character_file(status) || std::filesystem::is_block_file(status))
+        throw Error(ErrorCode::io, path + ": is a device: expected a file");
     std::ifstream stream(path);
     if (!stream) throw Error(ErrorCode::io, path + ": cannot open: " + std::strerror(errno));
     std::vector<std::string> lines;

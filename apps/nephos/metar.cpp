@@ -25,7 +25,7 @@ namespace {
 struct MetarArguments {
     std::string report, scene, folder;
     MetarSceneOptions options;
-    bool explain = false, lenient = false, run = false, no_render = false;
+    bool explain = false, lenient = false, run = false, no_render = false, resume = false, overwrite = false;
     WorkArguments work;
 };
 
@@ -104,6 +104,7 @@ void explain(const MetarArguments& a, const Taf& taf) {
 }
 
 int metar(const MetarArguments& a) {
+    if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     const std::string text = report_of(a.report);
     std::optional<Taf> taf;
     Metar report;
@@ -152,6 +153,8 @@ int metar(const MetarArguments& a) {
         run_settings(std::move(scene), a.scene.empty() ? report.station + ".toml" : a.scene);
     if (!a.folder.empty()) settings.folder = a.folder;
     settings.render = !a.no_render;
+    settings.resume = a.resume;
+    settings.overwrite = a.overwrite;
     defer_signals();
     std::unique_ptr<ProgressBar> bar;
     RunObserver observer;
@@ -181,9 +184,11 @@ void add_metar_command(CLI::App& app, Action& action) {
     command->add_option("-o,--scene", a->scene, "Write the scene to this file (default: print it)")
         ->type_name("FILE");
     command->add_flag("--explain", a->explain, "Only say what each group means and becomes");
-    command->add_flag("--run", a->run, "Also simulate the scene and draw it");
+    CLI::Option* run = command->add_flag("--run", a->run, "Also simulate the scene and draw it");
     command->add_option("--out", a->folder, "Folder of the run (default: out/NAME)")->type_name("DIR");
     command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics");
+    command->add_flag("--resume", a->resume, "Go on with the interrupted run in the folder")->needs(run);
+    command->add_flag("--overwrite", a->overwrite, "Remove the run in the folder first")->needs(run);
     command
         ->add_option("--date", a->options.date,
                      "Month of the report, such as 2024-06, which has only the day: for the sun")

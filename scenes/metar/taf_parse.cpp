@@ -50,14 +50,21 @@ bool begins_change(const std::string& word) {
     return word == "BECMG" || word == "TEMPO" || word == "INTER" || word.starts_with("PROB") || is_from(word);
 }
 
-// Returns the number of days of the month in "2024-06" or longer; 0 when it is empty or no month.
+// Returns the number of days of the month in "2024-06" or longer; 0 when it is empty. Throws Error(usage) when it is no
+// month.
 int days_of_month(std::string_view date) {
     using namespace std::chrono;
-    if (date.size() < 7 || date[4] != '-' || !all_digits(date.substr(0, 4)) || !all_digits(date.substr(5, 2)))
-        return 0;
+    if (date.empty()) return 0;
+    const bool has_form =
+        date.size() >= 7 && date[4] == '-' && all_digits(date.substr(0, 4)) && all_digits(date.substr(5, 2));
     const year_month_day_last last =
-        year(number(date.substr(0, 4))) / month(unsigned(number(date.substr(5, 2)))) / std::chrono::last;
-    return last.ok() ? int(unsigned(last.day())) : 0;
+        has_form
+            ? year(number(date.substr(0, 4))) / month(unsigned(number(date.substr(5, 2)))) / std::chrono::last
+            : year_month_day_last(year(0), month_day_last(month(0)));
+    if (!last.ok())
+        throw Error(ErrorCode::usage,
+                    "--date '" + std::string(date) + "' is no month: expected one such as 2024-06");
+    return int(unsigned(last.day()));
 }
 
 class TafReader {
@@ -128,11 +135,12 @@ class TafReader {
         ++at_;
     }
 
-    // A day and an hour, "2118".
-    static bool is_moment(const std::string& text) {
+    // Returns whether it is a day of the month and an hour, "2118".
+    bool is_moment(const std::string& text) const {
         const int day = number(text.substr(0, 2)), hour = number(text.substr(2, 2));
-        return day >= 1 && day <= 31 && hour <= 24;
+        return day >= 1 && day <= last_of_month() && hour <= 24;
     }
+    int last_of_month() const { return days_of_month_ > 0 ? days_of_month_ : 31; }
 
     // Seconds after the beginning of validity of a day and an hour, "2118".
     double moment(const std::string& text, int minute) const {
@@ -200,7 +208,9 @@ class TafReader {
             if (at_ >= words_.size() || !is_interval(words_[at_]))
                 fail("expected the time of the change, such as 2115/2118");
             const std::string begin = words_[at_].substr(0, 4), end = words_[at_].substr(5);
-            if (!is_moment(begin) || !is_moment(end)) fail("expected days from 01 to 31 and hours from 00 to 24");
+            if (!is_moment(begin) || !is_moment(end))
+                fail("expected days from 01 to " + std::to_string(last_of_month()) +
+                     " and hours from 00 to 24");
             period.from_s = moment(begin, 0);
             period.until_s = moment(end, 0);
             ++at_;

@@ -52,6 +52,7 @@ class Runner:
         if old_library:
             environment["GLIBC_TUNABLES"] = OLD_LIBRARY
         log = self.folder / "targets.log"
+        self.fused = True  # of a program that may take what it likes
         if targets is not None:
             log.unlink(missing_ok=True)
             environment.update(LD_PRELOAD=os.environ["TARGETS_LIBRARY"], NEPHOS_TARGETS=str(TARGETS[targets]),

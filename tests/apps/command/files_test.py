@@ -72,6 +72,10 @@ class Files(Case):
             (self.folder / "out" / name).unlink()
             os.mkfifo(self.folder / "out" / name)
             self.refused(3, "run", self.scene, "--no-render", "--out", "out", "--resume", says=name)
+        (self.folder / "until").mkdir()
+        os.mkfifo(self.folder / "until/manifest.json")
+        self.refused(3, "run", self.scene, "--statistics-only", "--until", "cover.se=0.5", "--max-steps", "9", "--out", "until",
+                     "--resume", says="manifest.json")
         # The folder and its parts may be links, to elsewhere and to nothing.
         elsewhere = self.folder / "elsewhere"
         (elsewhere / "grids").mkdir(parents=True)
@@ -127,6 +131,7 @@ class Files(Case):
                           ["hash", self.scene, "--from"]):
             with self.subTest(arguments=arguments):
                 self.refused(3, *arguments, "pipe", says="pipe")
+        self.refused(3, "hash", self.scene, "--check", "/dev/zero", says="/dev/zero: is a device: expected a file")
         result = subprocess.run(["bash", "-c", f'"{NEPHOS}" validate <(cat "{self.scene}")'], capture_output=True, text=True,
                                 timeout=60, env=self.environment)
         self.assertEqual(result.returncode, 0, result.stderr)

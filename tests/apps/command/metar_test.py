@@ -145,6 +145,11 @@ class Metar(Case):
             found = told("--date", date)
             self.assertEqual(found["length_s"], 3600 * hours)
             self.assertFalse([note for note in found["notes"] if "month" in note])
+        for date in ("2024-13", "2024-6", "june", "2024"):
+            self.refused(2, "metar", "TAF EGLL 3018/0100 24012KT 9999 FEW020", "--explain", "--date", date,
+                         says=f"--date '{date}' is no month")
+        self.assertIn("from 01 to 30", self.call("metar", "TAF EGLL 3018/0100 24012KT 9999 FEW020 BECMG 3106/3108 BKN030",
+                                                 "--date", "2024-06", status=2).stderr)
         found = told()
         self.assertEqual(found["length_s"], 3600 * 6)
         self.assertIn("the month is taken to end on day 30", " ".join(found["notes"]))
@@ -225,7 +230,12 @@ class Metar(Case):
 class Weather(Case):
     def setUp(self):
         super().setUp()
-        self.call("metar", REAL[0], "-o", "sky.toml", "--run", "--no-render", "--out", "run", "--date", "2024-06", "--at", "51.5,-0.5,25", "-q")
+        run = ("metar", REAL[0], "-o", "sky.toml", "--run", "--no-render", "--out", "run", "--date", "2024-06", "--at", "51.5,-0.5,25", "-q")
+        self.call(*run)
+        self.call(*run, "--resume")  # complete: there is nothing to do
+        self.call(*run, "--overwrite")
+        self.refused(2, *run, "--overwrite", "--resume", says="exclude each other")
+        self.refused(2, "metar", REAL[0], "--resume", says="--resume requires --run")
 
     def test_layers_and_simulators(self):
         self.call("export", "run", "--to", "layers", "--to", "xplane", "--to", "wpr", "--frames", "1..2", "-o", "weather")

@@ -47,6 +47,11 @@ class Mpi(Case):
         self.assertEqual(result.returncode, status, result.stdout + result.stderr)
         return result
 
+    def test_numbers_below_0_are_refused(self):
+        scene = self.write("s.toml", SCENE.format(boundaries='"periodic"', wind=""))
+        for option in ("--steps", "--seed"):
+            self.assertIn(option, self.mpirun(1, scene, option, "-5", "--hash", status=2).stderr)
+
 
 class Ranks(Mpi):
     def test_hashes_are_those_of_one_process(self):
