@@ -92,9 +92,21 @@ bool check_key(TomlTable& parameter, const std::string& key, std::set<std::strin
                          "expected a key that changes clouds; `seed` and [steps] of the fit are its own");
         return false;
     }
-    if (known.insert(key).second) return true;
-    parameter.report(place, "`" + key + "` is a parameter twice", "expected each key in one [[parameter]]");
-    return false;
+    if (!known.insert(key).second) {
+        parameter.report(place, "`" + key + "` is a parameter twice",
+                         "expected each key in one [[parameter]]");
+        return false;
+    }
+    const auto is_in = [](const std::string& inner, const std::string& outer) {
+        return std::ranges::count(outer_keys(inner), outer) > 0;
+    };
+    for (const std::string& other : known) {
+        if (!is_in(key, other) && !is_in(other, key)) continue;
+        parameter.report(place, fmt::format("`{}` and `{}` overlap", other, key),
+                         "expected keys of which none is a part of another one");
+        return false;
+    }
+    return true;
 }
 
 void read_parameter(TomlTable& parameter, const SweepOptions& base, std::optional<Measured>& measured,
@@ -104,7 +116,8 @@ void read_parameter(TomlTable& parameter, const SweepOptions& base, std::optiona
     if (to.keys.empty() && !parameter.has("key"))
         parameter.report("key", "a parameter has no key", "expected key = \"field.background.ext\"");
     std::vector<std::string> sound;
-    for (const std::string& key : to.keys) {
+    for (std::string& key : to.keys) {
+        key = canonical_key(key);
         if (check_key(parameter, key, known)) sound.push_back(key);
         if (measured && key.starts_with("lattice.cell")) measured->varies = true;
     }

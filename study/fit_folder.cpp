@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "study/placed_scene.h"
 #include "study/tables.h"
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -96,7 +97,8 @@ void write_results(const FitOptions& options, const FitResult& result, const std
         for (const std::string& key : options.problem.parameters[d].keys)
             overrides.push_back(key + "=" + number_text(result.best[d]));
     write_atomically(folder / "fitted.toml",
-                     to_toml(read_scene(options.base.scene_file, overrides, SceneUse::without_frames)));
+                     to_toml(placed_scene(
+                         read_scene(options.base.scene_file, overrides, SceneUse::without_frames), folder)));
 
     using Json = nlohmann::ordered_json;
     const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(); };

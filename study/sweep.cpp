@@ -34,11 +34,15 @@ Descriptor open_timing(const std::filesystem::path& path) {
 // Appends the time that a shard took. Returns the system's error, 0 without one.
 int add_timing(const Descriptor& file, const SweepJob& job, int workers, std::uint64_t runs, double wall_s) {
     struct stat status {};
-    const bool begins = ::fstat(file.get(), &status) == 0 && status.st_size == 0;
-    const std::string text =
-        fmt::format("{}{},{},{},{},{:.3f}\n", begins ? "shard,shards,workers,runs,wall_s\n" : "", job.shard,
-                    job.shards, workers, runs, wall_s);
-    return write_all(file.get(), std::as_bytes(std::span(text)));
+    const bool is_known = ::fstat(file.get(), &status) == 0;
+    const std::string text = fmt::format(
+        "{}{},{},{},{},{:.3f}\n", is_known && status.st_size == 0 ? "shard,shards,workers,runs,wall_s\n" : "",
+        job.shard, job.shards, workers, runs, wall_s);
+    const int error = write_all(file.get(), std::as_bytes(std::span(text)));
+    if (error != 0 && is_known) {
+        [[maybe_unused]] const int ignored = ::ftruncate(file.get(), status.st_size);
+    }
+    return error;
 }
 
 // By the value of the id: neither the order of runs nor a grown axis moves a run to another shard.
@@ -110,7 +114,7 @@ void require_place_for(const SweepPlan& plan, const FolderGuard& guard, const st
 }
 
 void place_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
-    write_atomically(folder / "scene.toml", plan.scene_text());
+    write_atomically(folder / "scene.toml", plan.scene_text_in(folder));
     write_atomically(folder / "sweep.toml", plan.to_toml());
 }
 
@@ -148,7 +152,7 @@ void write_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
 }
 
 bool is_plan_of(const SweepPlan& plan, const std::filesystem::path& folder) {
-    return has_content(folder / "scene.toml", plan.scene_text()) &&
+    return has_content(folder / "scene.toml", plan.scene_text_in(folder)) &&
            has_content(folder / "sweep.toml", plan.to_toml());
 }
 

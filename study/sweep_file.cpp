@@ -83,9 +83,11 @@ std::vector<std::string> pieces(std::string_view text, char separator) {
     std::vector<std::string> parts{""};
     int depth = 0;
     char quote = 0;
+    bool escaped = false;
     for (const char c : text) {
         if (quote != 0) {
-            if (c == quote) quote = 0;
+            if (c == quote && !escaped) quote = 0;
+            escaped = quote == '"' && c == '\\' && !escaped;
         } else if (c == '"' || c == '\'') {
             quote = c;
         } else if (c == '[' || c == '{') {
@@ -100,6 +102,13 @@ std::vector<std::string> pieces(std::string_view text, char separator) {
         }
     }
     return parts;
+}
+
+std::string_view trimmed(std::string_view text) {
+    constexpr std::string_view kBlank = " \t\r\n";
+    const std::size_t first = text.find_first_not_of(kBlank);
+    if (first == text.npos) return {};
+    return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
 }  // namespace
@@ -130,7 +139,7 @@ Axis parse_axis(const std::string& text) {
     if (equals == text.npos || equals == 0) fail("is not an axis");
     Axis axis;
     axis.keys = pieces(std::string_view(text).substr(0, equals), '+');
-    std::string_view rest = std::string_view(text).substr(equals + 1);
+    std::string_view rest = trimmed(std::string_view(text).substr(equals + 1));
     for (std::size_t n = 0; n < kScaleNames.size(); ++n) {
         const std::string prefix = std::string(kScaleNames[n]) + ":";
         if (!rest.starts_with(prefix)) continue;
@@ -139,10 +148,10 @@ Axis parse_axis(const std::string& text) {
     }
     const std::size_t dots = rest.find("..");
     const bool is_range =
-        dots != rest.npos && std::string_view("\"'[").find(rest[0]) == std::string_view::npos;
+        dots != rest.npos && std::string_view("\"'[{").find(rest[0]) == std::string_view::npos;
     if (!is_range) {
         if (axis.scale != Scale::linear) fail("names a scale but no range");
-        axis.values = pieces(rest, ',');
+        for (const std::string& value : pieces(rest, ',')) axis.values.emplace_back(trimmed(value));
         if (std::ranges::count(axis.values, "") > 0) fail("has an empty value");
         return axis;
     }

@@ -8,6 +8,8 @@
 #include <span>
 #include <tuple>
 
+#include "study/placed_scene.h"
+#include "study/toml_table.h"
 #include <fmt/format.h>
 
 #include "automaton/checkpoint.h"
@@ -17,6 +19,7 @@
 #include "core/text.h"
 #include "core/wind_field.h"
 #include "scenes/format/reader.h"
+#include "scenes/format/text.h"
 #include "scenes/format/writer.h"
 #include "simulation/layer_simulation.h"
 #include "simulation/scene_files.h"
@@ -45,17 +48,20 @@ std::string value_at(const Axis& axis, double unit) {
     return number_text(axis.from + unit * (axis.to - axis.from));
 }
 
-// One text for one value: "0.10" is 0.1, a word without quotes gets them.
+// Returns one text for one value: "0.10" is 0.1, a word without quotes gets them, "[1,2]" is "[1, 2]". What is no value
+// stays as it is, and whoever reads the scene with it says why.
 std::string canonical_value(const std::string& value) {
-    if (value.empty() || value == "true" || value == "false" ||
-        std::string_view("\"'[{").find(value[0]) != std::string_view::npos)
-        return value;
+    if (value.empty() || value == "true" || value == "false") return value;
+    if (std::string_view("\"'[{").find(value[0]) != std::string_view::npos)
+        return canonical_toml(value).value_or(value);
     double number = 0;
     const char* end = value.data() + value.size();
     const auto [last, error] = std::from_chars(value.data() + (value[0] == '+'), end, number);
-    if (error == std::errc() && last == end) return number_text(number);
-    return '"' + value + '"';
+    if (error == std::errc() && last == end) return number_text(number == 0 ? 0.0 : number);  // one zero only
+    return toml_string(value);
 }
+
+bool is_compound(const std::string& value) { return value.starts_with('[') || value.starts_with('{'); }
 
 // Returns the text as one word of a POSIX shell: values of keys may have spaces, quotes and brackets.
 std::string shell_word(const std::string& text) {
@@ -98,6 +104,28 @@ void require_different(const Axis& axis, const std::string& name) {
     }
 }
 
+// Refuses keys that overlap: the last one would win, and the id of a run does not tell which that was. Throws Error(usage).
+void require_apart(const std::vector<Axis>& axes) {
+    const auto fail = [](const std::string& message) { throw Error(ErrorCode::usage, message); };
+    std::map<std::string_view, const Axis*> known;
+    for (const Axis& axis : axes) {
+        for (const std::string& key : axis.keys) {
+            const auto [first, is_new] = known.emplace(key, &axis);
+            if (is_new) continue;
+            if (first->second != &axis) fail("key `" + key + "` is in two axes");
+            fail(fmt::format("axis {}: key `{}` is in it twice", joined_keys(axis), key));
+        }
+    }
+    for (const Axis& axis : axes)
+        for (const std::string& key : axis.keys)
+            for (const std::string& outer : outer_keys(key))
+                if (known.contains(outer))
+                    fail(fmt::format(
+                        "keys `{0}` and `{1}` overlap: a value of `{0}` holds one of `{1}`, and their "
+                        "order would decide; expected one of them",
+                        outer, key));
+}
+
 void check_options(const SweepOptions& options) {
     const auto fail = [](const std::string& message) { throw Error(ErrorCode::usage, message); };
     if (options.replicates < 1 || options.replicates > 100'000)
@@ -128,13 +156,8 @@ void check_options(const SweepOptions& options) {
         if (options.design == Design::list && axis.values.size() != options.axes.front().values.size())
             fail(fmt::format("{}: has {} values, the first axis {}: a list takes one of each for a point",
                              name, axis.values.size(), options.axes.front().values.size()));
-        for (const Axis& other : options.axes) {
-            for (const std::string& key : axis.keys) {
-                if (&other != &axis && std::ranges::count(other.keys, key) > 0)
-                    fail("key `" + key + "` is in two axes");
-            }
-        }
     }
+    require_apart(options.axes);
     if (is_sampled(options.design) && (options.points < 1 || options.points > kMaxPoints))
         fail(fmt::format("design '{}': expected points from 1 to {}", design_name(options.design),
                          kMaxPoints));
@@ -142,6 +165,27 @@ void check_options(const SweepOptions& options) {
 }
 
 }  // namespace
+
+std::string canonical_key(std::string_view key) {
+    constexpr std::string_view kBlank = " \t";
+    const std::size_t first = key.find_first_not_of(kBlank);
+    if (first == key.npos) return {};
+    key = key.substr(first, key.find_last_not_of(kBlank) - first + 1);
+    std::string text;
+    for (std::size_t n = 0; n < key.size(); ++n) {
+        const bool is_leading = key[n] == '0' && !text.empty() && text.back() == '[';
+        if (is_leading && n + 1 < key.size() && key[n + 1] >= '0' && key[n + 1] <= '9') continue;
+        text += key[n];
+    }
+    return text;
+}
+
+std::vector<std::string> outer_keys(std::string_view key) {
+    std::vector<std::string> outer;
+    for (std::size_t n = 1; n < key.size(); ++n)
+        if (key[n] == '.' || key[n] == '[') outer.emplace_back(key.substr(0, n));
+    return outer;
+}
 
 double largest_activation(const Scene& scene) {
     if (!scene.layers.empty()) return 1;
@@ -155,8 +199,10 @@ double largest_activation(const Scene& scene) {
 }
 
 SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
-    for (Axis& axis : options_.axes)
+    for (Axis& axis : options_.axes) {
+        for (std::string& key : axis.keys) key = canonical_key(key);
         for (std::string& value : axis.values) value = canonical_value(value);
+    }
     check_options(options_);
     scene_ = read_scene(options_.scene_file, options_.overrides, SceneUse::without_frames);
     std::vector<std::string> lattices;
@@ -182,11 +228,9 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     points_ = point_count(options_);
     if (is_sampled(options_.design))
         unit_points_ = unit_points(options_.design, points_, options_.axes.size(), options_.seed);
-    check_axes();
-    require_different_points();
+    require_different_points(check_axes());
     scene_.frames = {};  // of a study nothing is drawn
     scene_.frames.enabled = false;
-    scene_text_ = nephos::to_toml(scene_);
     simulation_hash_ = simulation_start(scene_).simulation_hash;
 }
 
@@ -195,24 +239,46 @@ std::size_t SweepPlan::measured_lattice() const {
     return found == scene_.layers.end() ? 0 : std::size_t(found - scene_.layers.begin());
 }
 
-void SweepPlan::check_axes() const {
+std::string SweepPlan::scene_text_in(const std::filesystem::path& folder) const {
+    return nephos::to_toml(placed_scene(scene_, folder));
+}
+
+std::vector<std::vector<std::string>> SweepPlan::check_axes() const {
+    std::vector<std::vector<std::string>> equals;
     for (const Axis& axis : options_.axes) {
         std::vector<std::string> values = axis.values;
         if (values.empty()) values = {value_at(axis, 0), value_at(axis, 1)};
-        for (const std::string& value : values) {
+        // Numbers and words have one text each; arrays and tables may say the same in several.
+        const bool may_equal =
+            std::ranges::any_of(values, [](const std::string& value) { return is_compound(value); });
+        std::map<std::pair<std::uint64_t, std::uint64_t>, std::size_t> scenes;
+        std::vector<std::string>& firsts = equals.emplace_back(values);
+        for (std::size_t n = 0; n < values.size(); ++n) {
             std::vector<std::string> overrides = options_.overrides;
-            for (const std::string& key : axis.keys) overrides.push_back(key + "=" + value);
-            read_scene(options_.scene_file, overrides, SceneUse::without_frames);
+            for (const std::string& key : axis.keys) overrides.push_back(key + "=" + values[n]);
+            const Scene scene = read_scene(options_.scene_file, overrides, SceneUse::without_frames);
+            if (!may_equal) continue;
+            const StateHash hash = hash_of_text(nephos::to_toml(scene));
+            const std::size_t first = scenes.emplace(std::pair(hash.high, hash.low), n).first->second;
+            if (first == n || (!is_compound(values[n]) && !is_compound(values[first]))) continue;
+            firsts[n] = values[first];
+            if (options_.design == Design::grid)
+                throw Error(
+                    ErrorCode::usage,
+                    fmt::format("axis {}: value {} is {}, which is the same as value {}, {}: expected each "
+                                "value once",
+                                joined_keys(axis), n + 1, values[n], first + 1, values[first]));
         }
     }
     // Values that are good alone may contradict each other.
     if (points_ > 0) scene_of(run(0));
     if (points_ > 1) scene_of(run(runs() - 1));
+    return equals;
 }
 
 // Points of a list, and those of a sample of whole numbers alone, may have all values in common: their runs would have the same
 // ids. Throws Error(usage) that names the first two.
-void SweepPlan::require_different_points() const {
+void SweepPlan::require_different_points(const std::vector<std::vector<std::string>>& equals) const {
     const bool may_repeat = options_.design == Design::list ||
                             (is_sampled(options_.design) && std::ranges::all_of(options_.axes, [](const Axis& axis) {
                                  return axis.scale == Scale::integer;
@@ -221,7 +287,10 @@ void SweepPlan::require_different_points() const {
     std::vector<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>> hashes;
     hashes.reserve(points_);
     for (std::uint64_t point = 0; point < points_; ++point) {
-        const StateHash hash = hash_of_text(identity(values_of_point(point)));
+        std::vector<std::string> values = values_of_point(point);
+        for (std::size_t n = 0; options_.design == Design::list && n < values.size(); ++n)
+            values[n] = equals[n][point];
+        const StateHash hash = hash_of_text(identity(values));
         hashes.emplace_back(hash.high, hash.low, point);
     }
     std::ranges::sort(hashes);

@@ -15,6 +15,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -78,12 +79,13 @@ struct PlannedRun {
 class SweepPlan {
   public:
     // Reads the scene and checks every value of every axis (of a range its ends) against it, before anything is run.
-    // Throws SceneErrors that point at the value, Error(usage) on axes that contradict each other, Error(io).
+    // Throws SceneErrors that point at the value, Error(usage) on axes that contradict each other or overlap, Error(io).
     explicit SweepPlan(SweepOptions options);
 
     const SweepOptions& options() const { return options_; }
     const Scene& scene() const { return scene_; }                  // with the overrides of all runs
-    const std::string& scene_text() const { return scene_text_; }  // canonical
+    // Returns the canonical text of the scene for a folder: as placed_scene().
+    std::string scene_text_in(const std::filesystem::path& folder) const;
     // Returns the place of the lattice that is measured among those of the scene.
     std::size_t measured_lattice() const;
     std::uint64_t points() const { return points_; }
@@ -96,20 +98,29 @@ class SweepPlan {
     std::string options_of(const PlannedRun& run) const;
     // Returns the command that repeats so many steps of a run, in the folder of the sweep: "nephos run ...".
     std::string command_of(const PlannedRun& run, std::uint64_t steps) const;
-    // Returns the canonical sweep file; the scene that it names is scene_text().
+    // Returns the canonical sweep file; the scene that it names is scene_text_in() its folder.
     std::string to_toml() const;
 
   private:
-    void check_axes() const;
-    void require_different_points() const;
+    // Returns for each value of each axis the first one of the axis that is the same.
+    std::vector<std::vector<std::string>> check_axes() const;
+    // `equals`: as check_axes() returns it.
+    void require_different_points(const std::vector<std::vector<std::string>>& equals) const;
     std::string identity(const std::vector<std::string>& values) const;
 
     SweepOptions options_;
     Scene scene_;
-    std::string scene_text_, simulation_hash_;
+    std::string simulation_hash_;
     std::uint64_t points_ = 0;
     std::vector<double> unit_points_;  // of sampled designs
 };
+
+// Returns a key as all ways of writing it have in common: " a[00] " is "a[0]".
+std::string canonical_key(std::string_view key);
+
+// Returns the paths of the tables and arrays that a canonical key is in, outermost first: of "a.b[0].c" these are "a", "a.b"
+// and "a.b[0]". Where one of them has a value, too, their order decides.
+std::vector<std::string> outer_keys(std::string_view key);
 
 // Returns the largest probability of activation anywhere and ever, 0 where no act can come; 1 where clouds of layers make
 // the field.

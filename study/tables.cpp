@@ -8,6 +8,7 @@
 #include <set>
 
 #include "study/netcdf_file.h"
+#include "study/placed_scene.h"
 #include "study/student.h"
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -349,7 +350,8 @@ void write_manifest(const SweepPlan& plan, const Records& records, const std::fi
     }
     for (std::size_t n = 0; n < counts.size(); ++n) regimes[std::string(regime_name(Regime(n)))] = counts[n];
     Json keys = Json::object();
-    for (const auto& [key, value] : parameters(plan.scene())) keys[key] = value;
+    for (const auto& [key, value] : parameters(placed_scene(plan.scene(), path.parent_path())))
+        keys[key] = value;
     Json columns = Json::object();
     for (const StatisticInfo& s : kStatistics)
         columns[std::string(s.name)] = {{"unit", s.unit}, {"definition", s.definition}};

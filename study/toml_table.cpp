@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -14,7 +15,39 @@ namespace {
 
 constexpr std::size_t kMaxFileBytes = 8u << 20;
 
-// A node as TOML on one line.
+// Returns the first date or time in a node, null where there is none. Of these the tree has no text, and no key of a scene
+// takes one.
+const Node* date_in(const Node& node) {
+    if (node.kind == Node::Kind::date) return &node;
+    for (const Node& item : node.items)
+        if (const Node* date = date_in(item)) return date;
+    for (const Entry& entry : node.entries)
+        if (const Node* date = date_in(entry.value)) return date;
+    return nullptr;
+}
+
+std::string key_text(const std::string& name) {
+    const bool bare = !name.empty() && std::ranges::all_of(name, [](char c) {
+        return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' ||
+               c == '-';
+    });
+    return bare ? name : toml_string(name);
+}
+
+std::string value_text(const Node& node);
+
+// Returns a table between braces, its keys sorted.
+std::string table_text(const Node& node) {
+    std::vector<const Entry*> sorted;
+    for (const Entry& entry : node.entries) sorted.push_back(&entry);
+    std::ranges::sort(sorted, {}, [](const Entry* entry) { return std::string_view(entry->name); });
+    std::vector<std::string> items;
+    for (const Entry* entry : sorted)
+        items.push_back(key_text(entry->name) + " = " + value_text(entry->value));
+    return "{" + joined(items, ", ") + "}";
+}
+
+// Returns a node as TOML on one line. Recursion is bounded by the parser. Precondition: date_in() finds nothing in it.
 std::string value_text(const Node& node) {
     switch (node.kind) {
         case Node::Kind::boolean:
@@ -22,7 +55,7 @@ std::string value_text(const Node& node) {
         case Node::Kind::integer:
             return std::to_string(node.integer);
         case Node::Kind::number:
-            return number_text(node.number);
+            return number_text(node.number == 0 ? 0.0 : node.number);  // one zero only
         case Node::Kind::text:
             return toml_string(node.text);
         case Node::Kind::array: {
@@ -30,11 +63,12 @@ std::string value_text(const Node& node) {
             for (const Node& item : node.items) items.push_back(value_text(item));
             return "[" + joined(items, ", ") + "]";
         }
-        case Node::Kind::date:
         case Node::Kind::table:
+            return table_text(node);
+        case Node::Kind::date:
             break;
     }
-    return {};
+    throw std::logic_error("a date has no text");
 }
 
 // " from 0 to 1"; ends that only say that a number is finite, or above 0, as words.
@@ -178,9 +212,9 @@ std::vector<std::string> TomlTable::values(const std::string& key) {
     if (entry == nullptr) return all;
     if (entry->value.kind != Node::Kind::array) wrong_kind(*entry, "an array of values");
     for (const Node& item : entry->value.items) {
-        if (item.kind == Node::Kind::table || item.kind == Node::Kind::date) {
-            document_.report(item.place, fmt::format("`{}` holds {}", path_of(key), kind_name(item.kind)),
-                             "expected numbers, texts, words or arrays of them");
+        if (const Node* date = date_in(item)) {
+            document_.report(date->place, fmt::format("`{}` holds {}", path_of(key), kind_name(date->kind)),
+                             "expected numbers, texts, words, or arrays or tables of them; a date is a text");
         } else {
             all.push_back(value_text(item));
         }
@@ -212,6 +246,16 @@ void TomlTable::tables(const std::string& key, const std::function<void(TomlTabl
         TomlTable inner(document_, item, indexed(path_of(key), n));
         read(inner);
     }
+}
+
+std::optional<std::string> canonical_toml(std::string_view value) {
+    Document document;
+    const std::optional<Node> root =
+        document.parse(document.add_origin({}, "v = " + std::string(value), false));
+    if (!root || root->entries.size() != 1 || root->entries.front().name != "v") return std::nullopt;
+    const Node& node = root->entries.front().value;
+    if (date_in(node) != nullptr) return std::nullopt;
+    return value_text(node);
 }
 
 void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read,

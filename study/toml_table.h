@@ -31,7 +31,7 @@ class TomlTable {
     std::optional<bool> flag(const std::string& key);
     std::optional<std::size_t> word(const std::string& key, const std::vector<std::string_view>& words);
     std::vector<std::string> texts(const std::string& key);
-    std::vector<std::string> values(const std::string& key);  // as TOML, one each
+    std::vector<std::string> values(const std::string& key);  // each as canonical_toml()
     // Calls `read` for the table `key`, or for each of an array of tables.
     void table(const std::string& key, const std::function<void(TomlTable&)>& read);
     void tables(const std::string& key, const std::function<void(TomlTable&)>& read);
@@ -50,6 +50,10 @@ class TomlTable {
     std::string path_;
     std::vector<std::string> asked_;
 };
+
+// Returns a value of TOML on one line, in the form that equal values have in common: keys of tables sorted, numbers and
+// texts as study files write them. Nothing where the text is not one value, or has a date or time in it.
+std::optional<std::string> canonical_toml(std::string_view value);
 
 // Reads a file into a table; messages call it by its `kind`. Throws SceneErrors with the problems, Error(io).
 void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read,

@@ -15,6 +15,7 @@
 #include "study/student.h"
 #include "study/sweep_file.h"
 #include "study/tables.h"
+#include "study/toml_table.h"
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -144,6 +145,28 @@ TEST(SweepFile, ListsOnlySoManyProblems) {
     std::filesystem::remove(path);
 }
 
+// Equal values have one text, and it is read back as the same; what has none is no value, and never an empty text.
+TEST(Axis, ValuesHaveOneText) {
+    for (const auto& [given, text] : std::vector<std::pair<std::string, std::string>>{
+             {"[8,8, 4]", "[8, 8, 4]"},
+             {"[ 1.0, -0.0, 1e-7, true,]", "[1, 0, 1e-07, true]"},
+             {"'a\"b'", "\"a\\\"b\""},
+             {"{ b = [{}], a.\"c d\" = 1_000 }", "{a = {\"c d\" = 1000}, b = [{}]}"},
+             {"[{levels=[{height_m=0}]}]", "[{levels = [{height_m = 0}]}]"}}) {
+        EXPECT_EQ(canonical_toml(given), text);
+        EXPECT_EQ(canonical_toml(text), text);
+    }
+    for (const char* bad :
+         {"", "[1", "[1] 2", "[1]\nw = 2", "2026-07-01", "[2026-07-01]", "{a = [{b = 12:00:00}]}"})
+        EXPECT_FALSE(canonical_toml(bad)) << bad;
+}
+
+TEST(Axis, KeysOverlapWhereOneIsAPartOfTheOther) {
+    EXPECT_EQ(canonical_key(" a[00].b[10][007] "), "a[0].b[10][7]");
+    EXPECT_EQ(outer_keys("a.b[0].c"), (std::vector<std::string>{"a", "a.b", "a.b[0]"}));
+    EXPECT_TRUE(outer_keys("a").empty());
+}
+
 TEST(Axis, IsReadFromTheCommandLine) {
     EXPECT_EQ(parse_axis("a.b=0.1,0.2").values, (std::vector<std::string>{"0.1", "0.2"}));
     EXPECT_EQ(parse_axis("a.b=0.1..0.3:3").values, (std::vector<std::string>{"0.1", "0.2", "0.3"}));
@@ -151,12 +174,15 @@ TEST(Axis, IsReadFromTheCommandLine) {
               (std::vector<std::string>{"1e-06", "1e-05", "0.0001", "0.001", "0.01"}));
     EXPECT_EQ(parse_axis("a=integer:1..4:4").values, (std::vector<std::string>{"1", "2", "3", "4"}));
     EXPECT_EQ(parse_axis("a=[1, 2],[3, 4]").values, (std::vector<std::string>{"[1, 2]", "[3, 4]"}));
+    EXPECT_EQ(parse_axis("a={b=1, c=[2,3]} ,{b=\"..}\"}").values,
+              (std::vector<std::string>{"{b=1, c=[2,3]}", "{b=\"..}\"}"}));
+    EXPECT_EQ(parse_axis("w=\"a\\\",b\", c ").values, (std::vector<std::string>{"\"a\\\",b\"", "c"}));
     EXPECT_EQ(parse_axis("w=\"a,b\",c").values, (std::vector<std::string>{"\"a,b\"", "c"}));
     const Axis range = parse_axis("a+b[0].c=log:0.001..1");
     EXPECT_EQ(range.keys, (std::vector<std::string>{"a", "b[0].c"}));
     EXPECT_TRUE(range.values.empty() && range.scale == Scale::log && range.from == 0.001 && range.to == 1);
-    for (const char* bad :
-         {"a", "=1", "a=1..", "a=..", "a=1..x", "a=2..1", "a=1,,2", "a=1..2:1", "a=1..2:2.5", "a=log:3"})
+    for (const char* bad : {"a", "=1", "a=1, ,2", "a=1..", "a=..", "a=1..x", "a=2..1", "a=1,,2", "a=1..2:1",
+                            "a=1..2:2.5", "a=log:3"})
         EXPECT_THROW(parse_axis(bad), Error) << bad;
 }
 

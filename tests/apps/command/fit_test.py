@@ -66,6 +66,23 @@ class Fit(Case):
         self.assertEqual(self.call("fit", file, "--out", "fit", "-j", "1").stdout, result.stdout)
         self.assertEqual((self.folder / "fit/wave-1/timing.csv").read_text(), before)
 
+    def test_the_fitted_scene_finds_its_files(self):
+        self.write("null.toml", NULL)
+        self.call("run", "null.toml", "--no-render", "--set", "density.write_state=true", "--set", "frames.count=1", "--set",
+                  "time.steps=2", "--out", "w")
+        self.write("data/a.toml", NULL.replace('initial = "empty"', 'initial_state = "../w/density/null_0001.vdb"'))
+        file = self.write("data/fit.toml", FIT.replace("null.toml", "a.toml").replace("runs = 32", "runs = 10").replace("proof = 4", "proof = 1"))
+        self.call("fit", "data/fit.toml", "--out", "data/fit", "-j", "2")
+        self.call("validate", "data/fit/fitted.toml")
+        self.call("report", "data/fit/wave-1")
+        before = (self.folder / "data/fit/fitted.toml").read_bytes()
+        self.assertIn(b'"../../w/density/null_0001.vdb"', before)
+        self.folder, home = self.folder / "data/fit", self.folder
+        self.call("validate", "fitted.toml")
+        self.call("fit", file, "--out", ".", "-j", "2")
+        self.folder = home
+        self.assertEqual((self.folder / "data/fit/fitted.toml").read_bytes(), before)
+
     def test_the_target_that_no_run_has_is_named(self):
         """Nothing pulses without vapour."""
         self.write("null.toml", NULL)
@@ -111,6 +128,8 @@ class Fit(Case):
         self.said_at(FIT.replace("sd = 0.003", "sd = 0"), "sd = 0", "`target[0].sd` is 0", "expected a number above 0\n")
         self.said_at(FIT.replace("[[target]]", second.replace(".act", ".ext") + "[[target]]").replace("key = \"", "keys = \"", 1),
                      "key = \"", "`field.background.ext` is a parameter twice", "expected each key in one [[parameter]]")
+        self.said_at(FIT.replace("[[target]]", second.replace("ground.act", "ground") + "[[target]]"), "key = \"field.background\"",
+                     "`field.background.ext` and `field.background` overlap", "none is a part of another one")
         self.said_at(FIT.replace("to = 0.3", "to = 1.4"), "prior =", "`field.background.ext` is 1.4, too large",
                      "expected a number from 0 to 1, a probability per step")
         self.said_at(FIT.replace("from = 0.02", "from = -0.1").replace(', scale = "log"', ""), "prior =", "is -0.1, too small")

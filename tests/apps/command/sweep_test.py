@@ -2,6 +2,7 @@
 """`nephos sweep` and `nephos merge`: the same tables whatever happened on the way, and statistics with a known answer."""
 
 import csv
+import html
 import json
 import math
 import os
@@ -222,6 +223,140 @@ files = ["written/density/written_0001.vdb"]
         pairs = self.call("sweep", self.null, "--axis", "field.background.ext=0.1,0.1", "--axis",
                           "field.background.act=0.01,0.02", "--design", "list", "--dry-run", "-r", "1")
         self.assertIn("2 points", pairs.stdout)
+
+    def test_values_with_tables_reach_the_runs(self):
+        values = ["[{levels = [{from_deg = 0, height_m = 0, speed_m_per_s = 90}]}]", "[]"]
+        plan = self.write("plan.toml", """\
+scene = "null.toml"
+replicates = 1
+steps = { min = 20, max = 20 }
+[[axis]]
+keys = ["wind"]
+values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }], []]
+""")
+        self.call("sweep", plan, "--out", "file")
+        table = rows(self.folder / "file/runs.csv")
+        self.assertEqual([run["wind"] for run in table], values)
+        for run in table:
+            for scene in (self.null, "file/scene.toml"):
+                last = self.hashes(scene, "--steps", "20", "--seed", run["seed"], "--set", f"wind={run['wind']}").splitlines()[-1]
+                self.assertEqual(last, f"20 {run['state_hash']}")
+        # The command line, however it writes them, and parts of the plan that it leaves, give the same bytes.
+        given = ("sweep", self.null, "--axis", f"wind={values[0].replace(' ', '')} , [ ]", "--replicates", "1", "--steps", "20")
+        self.call(*given, "--out", "line")
+        self.call(*given, "--out", "parts", "--emit", "parallel", "--tasks", "2")
+        for shard in range(2):
+            self.call("sweep", "parts/sweep.toml", "--out", "parts", "--shard", f"{shard}/2")
+        self.call("merge", "parts")
+        for folder in ("line", "parts"):
+            self.assertEqual(self.tables(folder), self.tables("file"))
+        self.call("report", "line")
+        page = html.unescape((self.folder / "line/report.html").read_text())
+        self.assertIn(f"--set 'wind={values[0]}' --seed {table[0]['seed']}", page)
+        dated = self.write("dated.toml", pathlib.Path(plan).read_text().replace("9e1", "2026-07-01"))
+        self.assertIn("`axis[0].values` holds a date or time", self.call("sweep", dated, "--out", "no", status=2).stderr)
+        self.call("sweep", self.null, "--axis", "wind=[{levels=[{height_m=2026-07-01}]}]", "--out", "no", status=2)
+        self.assertFalse((self.folder / "no").exists())
+
+    def test_keys_that_overlap_are_refused(self):
+        """The last one would win, but the ids of the runs do not tell the order."""
+        windy = self.write("windy.toml", NULL + "[[wind]]\nlevels = [{ height_m = 0, east_m_per_s = 7, north_m_per_s = -3 }]\n")
+        pairs = (("field.background", "{ext = 0.1}", "field.background.ext", "0.2"),
+                 ("lattice.cells", "[8, 8, 4]", "lattice.cells[0]", "16"),
+                 ("wind", "[]", "wind[0].levels[0].east_m_per_s", "5"))
+        for outer, table, inner, number in pairs:
+            for one, two in (((outer, table), (inner, number)), ((inner, number), (outer, table))):
+                says = f"keys `{outer}` and `{inner}` overlap"
+                axes = [f"--axis={key}={value}" for key, value in (one, two)]
+                plan = self.write("plan.toml", 'scene = "windy.toml"\n' + "".join(
+                    f'[[axis]]\nkey = "{key}"\nvalues = [{value}]\n' for key, value in (one, two)))
+                for arguments in ([windy, *axes], [plan], [windy, f"--axis={one[0]}+{two[0]}={one[1]}"]):
+                    with self.subTest(arguments=arguments):
+                        self.refused(2, "sweep", *arguments, "--out", "bad", says=says)
+        ext = "field.background.ext"
+        for axes, says in (([f"{ext}+{ext}=0.1,0.2"], f"key `{ext}` is in it twice"),
+                           ([f"{ext}=0.1", f"{ext} =0.2"], f"key `{ext}` is in two axes"),
+                           (["lattice.cells[0]=8", "lattice.cells[00]=16"], "key `lattice.cells[0]` is in two axes")):
+            self.refused(2, "sweep", self.null, *(f"--axis={axis}" for axis in axes), "--out", "bad", says=says)
+        self.assertFalse((self.folder / "bad").exists())
+        # Beside each other they are good, also where one name begins another; what all runs have in common comes first.
+        said = self.call("sweep", self.null, "--axis", "lattice.cells[0]=8,16", "--axis", "lattice.cells[1]=8,16", "--axis",
+                         "lattice.cell_size_m=40,50", "--set", "lattice.cells=[8,8,4]", "--dry-run").stdout
+        self.assertIn("8 points", said)
+
+    def test_what_the_command_line_takes_is_read_back(self):
+        for number, axis in enumerate(("field.background={ext=0.1,act=0.01} , {act=0.02,ext=0.2}", "lattice.cells=[8,8,4], [8, 8,5]",
+                                       'lattice.boundaries="open",["periodic","periodic","open"]', "lattice.cells[00]=8,16",
+                                       "lattice.initial='empty'")):
+            with self.subTest(axis=axis):
+                out = f"out{number}"
+                self.call("sweep", self.null, "--axis", axis, "--replicates", "1", "--steps", "20", "--out", out)
+                runs = len(rows(self.folder / out / "runs.csv"))
+                plan = (self.folder / out / "sweep.toml").read_bytes()
+                before = self.tables(out)
+                said = self.call("sweep", f"{out}/sweep.toml", "--out", out, "--status").stdout
+                self.assertIn(f"{runs} of {runs} runs done", said)
+                for command in (("sweep", f"{out}/sweep.toml", "--out", out), ("merge", out), ("report", out)):
+                    self.call(*command)
+                self.assertEqual((self.folder / out / "sweep.toml").read_bytes(), plan)
+                self.assertEqual(self.tables(out), before)
+        # The same checks at both entrances.
+        for key, values in (("lattice.cells", "[8,8,4] ,[8, 8,4]"), ("field.background.hum", "0,-0"), ("field.background.hum", "-0.0,0"),
+                            ("lattice.boundaries", '"open",["open","open","open"]'),
+                            ("field.background", "{ext=0.1,act=0.01},{act=0.010,ext=0.1}"),
+                            ("field.background", "{ext=0.1,act=0.01},{act=0.01,ext=0.1,hum=0}")):
+            plan = self.write("plan.toml", f'scene = "null.toml"\n[[axis]]\nkey = "{key}"\nvalues = [{values}]\n')
+            for arguments in ([self.null, "--axis", f"{key}={values}"], [plan]):
+                with self.subTest(arguments=arguments):
+                    self.refused(2, "sweep", *arguments, "--out", "twice", says="expected each value once")
+                    self.refused(2, "sweep", *arguments, "--out", "twice", "--design", "list", says="points 1 and 2 of the list are the same")
+        self.assertFalse((self.folder / "twice").exists())
+
+    def test_files_of_a_scene_are_found_from_the_folder_of_the_sweep(self):
+        self.call("run", self.null, "--no-render", "--set", "density.write_state=true", "--set", "frames.count=1", "--set",
+                  "time.steps=2", "--out", "w")
+        data = self.folder / "data"
+        data.mkdir()
+        shutil.copy(self.folder / "w/density/null_0001.vdb", data / "init.vdb")
+        scene = self.write("data/a.toml", NULL.replace('initial = "empty"', 'initial_state = "init.vdb"'))
+        sweep = ("--axis", "field.background.ext=0.1,0.2", "--replicates", "1", "--steps", "20")
+        self.call("sweep", "data/a.toml", *sweep, "--out", "data/o")
+        self.assertIn('initial_state = "../init.vdb"', (data / "o/scene.toml").read_text())
+        before = self.tables("data/o")
+        plan = [(data / "o" / name).read_bytes() for name in ("scene.toml", "sweep.toml")]
+        self.call("report", "data/o")
+        page = (data / "o/report.html").read_bytes()
+        # The same from any folder, by any name of the scene, and where all of it was moved to.
+        for folder, named, out in ((data, "a.toml", "o"), (self.folder, scene, data / "o"), (data / "o", "../a.toml", ".")):
+            self.folder, home = folder, self.folder
+            self.assertIn("2 of 2 runs done", self.call("sweep", named, *sweep, "--out", out, "--status").stdout)
+            self.call("sweep", named, *sweep, "--out", out)
+            self.call("sweep", pathlib.Path(out) / "sweep.toml", "--out", out)
+            self.call("merge", out)
+            self.call("report", out)
+            self.call("validate", pathlib.Path(out) / "scene.toml")
+            self.folder = home
+            self.assertEqual(self.tables("data/o"), before)
+            self.assertEqual([(data / "o" / name).read_bytes() for name in ("scene.toml", "sweep.toml")], plan)
+            self.assertEqual((data / "o/report.html").read_bytes(), page)
+        run = rows(data / "o/runs.csv")[1]
+        last = self.hashes("data/o/scene.toml", "--steps", "20", "--seed", run["seed"], "--set", "field.background.ext=0.2").splitlines()[-1]
+        self.assertEqual(last, f"20 {run['state_hash']}")
+        data.rename(self.folder / "moved")
+        self.call("sweep", "moved/o/sweep.toml", "--out", "moved/o")
+        self.assertEqual(self.tables("moved/o"), before)
+        # A folder that is reached through a link has another parent than its name says.
+        (self.folder / "elsewhere/deep").mkdir(parents=True)
+        (self.folder / "link").symlink_to("elsewhere/deep")
+        self.call("sweep", "moved/a.toml", *sweep, "--out", "link/o")
+        for folder in ("link/o", "elsewhere/deep/o"):
+            self.call("validate", f"{folder}/scene.toml")
+            self.call("report", folder)
+        # A sweep whose scene names its file from another folder goes on, and is mended.
+        text = (self.folder / "moved/o/scene.toml").read_text()
+        (self.folder / "moved/o/scene.toml").write_text(text.replace("../init.vdb", "data/init.vdb"))
+        self.assertIn('"before": 2', self.call("sweep", "moved/a.toml", *sweep, "--out", "moved/o", "--json").stdout)
+        self.assertEqual((self.folder / "moved/o/scene.toml").read_text(), text)
 
     def test_a_grown_axis_computes_only_what_is_new(self):
         self.sweep("grown", "-j", "2", axis="field.background.ext=0.2,0.05")

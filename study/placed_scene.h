@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Scenes that are written into a folder of a study, from where the files that they name are found.
+
+#include <filesystem>
+
+#include "scenes/format/scene.h"
+
+namespace nephos {
+
+// Returns the scene with the names of its files as a text in `folder` has them: relative to the folder, so that both may
+// move together; absolute where the two have no folder in common but the root, or where the folder is reached through a
+// link, which makes ".." ambiguous. Neither the current folder nor the way in which the scene named them changes the result.
+Scene placed_scene(Scene scene, const std::filesystem::path& folder);
+
+}  // namespace nephos
