@@ -3,6 +3,7 @@
 
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -37,6 +38,40 @@ RunFolder folder_of(const std::filesystem::path& checkpoint, const Scene& scene)
     return {checkpoint.parent_path(), scene.name};
 }
 
+BranchPoint point_of(const Checkpoint& checkpoint, const std::filesystem::path& file) {
+    BranchPoint point;
+    point.checkpoint = file;
+    point.simulation_hash = checkpoint.simulation_hash;
+    point.state_hash = checkpoint.state.hex();
+    point.steps = checkpoint.steps;
+    point.next_frame = saved_point(checkpoint).next_frame;
+    return point;
+}
+
+bool is_same(const BranchPoint& a, const BranchPoint& b) {
+    return a.simulation_hash == b.simulation_hash && a.state_hash == b.state_hash && a.steps == b.steps &&
+           a.next_frame == b.next_frame;
+}
+
+// Returns whether `from`, which need not be there any more, names this checkpoint or its folder.
+bool is_place(const std::filesystem::path& from, const std::filesystem::path& checkpoint) {
+    std::error_code error;
+    const std::filesystem::path whole = std::filesystem::absolute(from, error);
+    const std::filesystem::path place = std::filesystem::weakly_canonical(checkpoint, error);
+    return std::filesystem::weakly_canonical(whole, error) == place ||
+           std::filesystem::weakly_canonical(whole / place.filename(), error) == place;
+}
+
+// Returns the simulation hash of a branch, whose scene alone has that of `scene`.
+std::string branch_hash(const std::string& scene, const BranchPoint& point) {
+    Digest digest;
+    digest.add(scene);
+    digest.add(point.simulation_hash);
+    digest.add(point.state_hash);
+    digest.add(std::to_string(point.steps));
+    return digest.hex();
+}
+
 // Copies the header and the rows of all steps before `steps`.
 void copy_statistics(const std::filesystem::path& from, const std::filesystem::path& to, std::uint64_t steps,
                      std::string_view header) {
@@ -52,21 +87,44 @@ void copy_statistics(const std::filesystem::path& from, const std::filesystem::p
 }  // namespace
 
 void branch_off(RunSettings& settings, const std::filesystem::path& from) {
-    settings.branch = checkpoint_of(from);
-    const Checkpoint checkpoint = read_checkpoint(*settings.branch);
-    const SavedPoint point = saved_point(checkpoint);
-    if (point.next_step > settings.scene.steps + 1) {
-        throw Error(ErrorCode::usage,
-                    fmt::format("{}: was saved at step {}, but the scene ends at step {}: expected more `time.steps`",
-                                settings.branch->string(), point.next_step, settings.scene.steps));
+    const std::filesystem::path file = checkpoint_of(from);
+    const Checkpoint checkpoint = read_checkpoint(file);
+    const SavedPoint saved = saved_point(checkpoint);
+    if (saved.next_step > settings.scene.steps + 1) {
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: was saved at step {}, but the scene ends at step {}: expected more `time.steps`",
+                        file.string(), saved.next_step, settings.scene.steps));
     }
+    branch_off(settings, point_of(checkpoint, file));
+}
+
+void branch_off(RunSettings& settings, BranchPoint point) {
     settings.range.first_frame = point.next_frame;
-    Digest digest;
-    digest.add(settings.simulation_hash);
-    digest.add(checkpoint.simulation_hash);
-    digest.add(checkpoint.state.hex());
-    digest.add(std::to_string(checkpoint.steps));
-    settings.simulation_hash = digest.hex();
+    settings.simulation_hash = branch_hash(settings.simulation_hash, point);
+    settings.branch = std::move(point);
+}
+
+std::optional<BranchPoint> branch_in(const std::filesystem::path& folder, const std::filesystem::path& from) {
+    const RunFolder run{folder, {}};
+    if (!std::filesystem::exists(run.checkpoint()) || !std::filesystem::exists(run.manifest())) return {};
+    std::optional<BranchPoint> point = read_manifest(run.manifest()).branch;
+    if (!point || point->simulation_hash.empty()) return {};
+    if (from.empty() || is_place(from, point->place)) return point;
+    const std::filesystem::path file = checkpoint_of(from);
+    if (is_same(point_of(read_checkpoint(file), file), *point)) return point;
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: branched off {}, not {}: give the --from of the first call, or none",
+                            folder.string(), point->checkpoint.string(), from.string()));
+}
+
+bool is_branch_point(const Checkpoint& checkpoint, const BranchPoint& point, const Scene& scene,
+                     const std::string& simulation_hash) {
+    const BranchPoint found = point_of(checkpoint, point.checkpoint);
+    if (found.next_frame != point.next_frame) return false;
+    if (!point.simulation_hash.empty()) return is_same(found, point);
+    return branch_hash(run_settings(scene, {}, RunStart::checkpoint).simulation_hash, found) ==
+           simulation_hash;
 }
 
 std::string scene_text_beside(const std::filesystem::path& from) {
@@ -74,9 +132,9 @@ std::string scene_text_beside(const std::filesystem::path& from) {
 }
 
 Simulation branched_simulation(const RunSettings& settings, const RunFolder& folder) {
-    const Checkpoint checkpoint = read_checkpoint(*settings.branch);
+    const Checkpoint checkpoint = read_checkpoint(settings.branch->checkpoint);
     const std::uint64_t steps = saved_point(checkpoint).next_step;
-    const RunFolder parent = folder_of(*settings.branch, settings.scene);
+    const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
     std::error_code failed;
     if (std::filesystem::equivalent(parent.folder.empty() ? "." : parent.folder, folder.folder, failed)) {
         throw Error(ErrorCode::usage, folder.folder.string() +
@@ -92,7 +150,7 @@ Simulation branched_simulation(const RunSettings& settings, const RunFolder& fol
         return simulation;
     } catch (const Error& error) {
         if (error.code() != ErrorCode::usage) throw;
-        throw Error(ErrorCode::usage, settings.branch->string() + ": " + error.what());
+        throw Error(ErrorCode::usage, settings.branch->checkpoint.string() + ": " + error.what());
     }
 }
 

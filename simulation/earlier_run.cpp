@@ -97,6 +97,23 @@ std::string range_text(const EarlierRun& run) {
                        run.render ? "" : ", without pictures");
 }
 
+// Names what differs where no key does.
+std::string other_content(const EarlierRun& earlier, const RunSettings& settings) {
+    const std::vector<RunInput> now = inputs_of(settings);
+    const std::string states = changed_inputs(earlier.inputs, now, {InputKind::first_state}),
+                      others =
+                          changed_inputs(earlier.inputs, now, {InputKind::simulation, InputKind::picture});
+    if (!states.empty())
+        return fmt::format("the initial state differs: {}{}{}", states, others.empty() ? "" : ", and ",
+                           others);
+    if (!others.empty()) return "the content of a file differs: " + others;
+    if (earlier.branch.has_value() != settings.branch.has_value())
+        return earlier.branch ? "it branched off another run: give the same --from"
+                              : "it did not branch off another run";
+    if (settings.branch) return "the run that it branched off differs";
+    return "the content of a file that it names differs";
+}
+
 // Names the keys in which two scenes differ, at most three of them.
 std::string changed_keys(const EarlierRun& earlier, const RunSettings& settings) {
     std::vector<std::string> keys;
@@ -117,14 +134,15 @@ std::string changed_keys(const EarlierRun& earlier, const RunSettings& settings)
     for (const auto& [key, value] : earlier.parameters) compare(key);
     for (const auto& [key, value] : list_now)
         if (!then.contains(key)) compare(key);
-    if (keys.empty()) return "the initial state differs";
+    if (keys.empty()) return other_content(earlier, settings);
     const std::size_t more = keys.size() > 3 ? keys.size() - 3 : 0;
     keys.resize(keys.size() - more);
     return fmt::format("{}{}", fmt::join(keys, "; "), more > 0 ? fmt::format("; and {} more", more) : "");
 }
 
-// Describes what makes the scene another one than that of the earlier run.
-std::string difference(const EarlierRun& earlier, const RunSettings& settings) {
+// Describes what makes the scene another one than that of the earlier run. `before`: with the steps of then.
+std::string difference(const EarlierRun& earlier, const RunSettings& settings, const Scene& before) {
+    if (earlier.scene_hash == scene_hash(before)) return other_content(earlier, settings);
     Scene other_video = settings.scene;
     other_video.frames.video = !other_video.frames.video;
     if (earlier.scene_hash == scene_hash(other_video)) {
@@ -146,7 +164,20 @@ Scene scene_before(const EarlierRun& earlier, const RunSettings& settings, const
                     "--seed, --set and --video of the first call (manifest.json has the scene under "
                     "\"scene_text\"; only time.steps may be larger), or start anew with --overwrite",
                     folder.folder.string(), earlier.scene_hash, settings.scene_hash,
-                    difference(earlier, settings)));
+                    difference(earlier, settings, before)));
+}
+
+// Throws Error(usage) when frames that are to come would be drawn with other pictures than those that are there.
+void refuse_other_pictures(const EarlierRun& earlier, const std::vector<RunInput>& inputs,
+                           const RunFolder& folder) {
+    const std::string changed = changed_inputs(earlier.inputs, inputs, {InputKind::picture});
+    if (changed.empty()) return;
+    throw Error(
+        ErrorCode::usage,
+        fmt::format(
+            "{}: was started with another content of {}: put the file of then back to resume, or start "
+            "anew with --overwrite",
+            folder.folder.string(), changed));
 }
 
 // The range that the same command line gives for the scene as it was.
@@ -233,9 +264,11 @@ Resumption find_resumption(const RunSettings& settings, const RunFolder& folder)
 
 void remove_checkpoint(const RunFolder& folder) { remove_file(folder.checkpoint()); }
 
-Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder) {
+Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder,
+                              const std::vector<RunInput>& inputs) {
     const EarlierRun earlier = read_manifest(folder.manifest());
     const Scene before = scene_before(earlier, settings, folder);
+    refuse_other_pictures(earlier, inputs, folder);
     const SimulationRange range = range_before(settings, before);
     const EarlierRun now{.render = settings.render, .range = range};
     if (earlier.range != range || earlier.render != settings.render) {

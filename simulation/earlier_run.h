@@ -6,8 +6,10 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "simulation/run_folder.h"
+#include "simulation/run_inputs.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -38,8 +40,10 @@ Resumption find_resumption(const RunSettings& settings, const RunFolder& folder)
 void remove_checkpoint(const RunFolder& folder);
 
 // Returns the simulation of the folder's checkpoint. The scene may be that of the first call with a larger
-// `time.steps`; frames that were written before then name the hash of that scene. Throws Error(usage) when it is
-// another scene, or other frames were asked for, and as Simulation, naming the file.
-Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder);
+// `time.steps`; frames that were written before then name the hash of that scene. `inputs`: the files that the scene names,
+// as they are now. Throws Error(usage) when it is another scene, a picture that decides pixels is another one than then, or
+// other frames were asked for, and as Simulation, naming the file.
+Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder,
+                              const std::vector<RunInput>& inputs);
 
 }  // namespace nephos

@@ -13,6 +13,7 @@
 #include "core/math.h"
 #include "core/random.h"
 #include "density/combine.h"
+#include "scenes/format/reader.h"
 #include "scenes/format/text.h"
 #include "scenes/format/writer.h"
 #include "simulation/checked_json.h"
@@ -180,6 +181,36 @@ Json layers_json(const RunSettings& settings, const RunFolder& folder) {
     return layers;
 }
 
+Json branch_json(const BranchPoint& branch, const std::filesystem::path& folder) {
+    std::filesystem::path file = branch.place.empty() ? branch.checkpoint : branch.place;
+    if (branch.checkpoint.is_relative()) file = std::filesystem::proximate(file);
+    return {{"checkpoint", branch.checkpoint.generic_string()},
+            {"path", path_from(folder, file).generic_string()},
+            {"steps", branch.steps},
+            {"state_hash", branch.state_hash},
+            {"simulation_hash", branch.simulation_hash}};
+}
+
+BranchPoint branch_point(const Json& json, const std::filesystem::path& folder) {
+    BranchPoint branch;
+    branch.checkpoint = json.at("checkpoint").get<std::string>();
+    if (!json.contains("path")) return branch;
+    branch.place = path_of(folder, json.at("path").get<std::string>());
+    branch.steps = json.at("steps").get<std::uint64_t>();
+    branch.state_hash = json.at("state_hash").get<std::string>();
+    branch.simulation_hash = json.at("simulation_hash").get<std::string>();
+    return branch;
+}
+
+Json inputs_json(const std::vector<RunInput>& inputs) {
+    Json::object_t files;  // appended to: a key of an object is looked for among all of its keys
+    for (const RunInput& input : inputs)
+        files.emplace_back(input.key, Json{{"path", input.path.generic_string()},
+                                           {"bytes", input.digest.bytes},
+                                           {"xxh3", input.digest.xxh3}});
+    return files;
+}
+
 // All that stands before the list of frames.
 Json head_json(const RunSettings& settings, const ManifestState& state) {
     const Scene& scene = settings.scene;
@@ -197,7 +228,7 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
                      {"simulation_hash", settings.simulation_hash},
                      {"seed", std::to_string(scene.automaton.seed)},
                      {"steps", scene.steps}};
-    if (settings.branch) json["branch"] = {{"checkpoint", settings.branch->generic_string()}};
+    if (settings.branch) json["branch"] = branch_json(*settings.branch, settings.folder);
     json["range"] = {{"last_step", settings.range.last_step},
                      {"first_frame", settings.range.first_frame},
                      {"last_frame", settings.range.last_frame},
@@ -218,6 +249,7 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
     if (state.complete && settings.render && scene.frames.video) {
         json["files"]["video"] = relative(settings, folder.video());
     }
+    if (!state.inputs.empty()) json["inputs"] = inputs_json(state.inputs);
     json["frames_per_second"] = scene.frames.per_second;
     json["time_scale"] = scene.frames.time_scale;
     return json;
@@ -314,7 +346,13 @@ std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& pa
 }
 
 std::string read_scene_text_of(const std::filesystem::path& path) {
-    return with_manifest(path, [](const Json& json) { return json.at("scene_text").get<std::string>(); });
+    const std::string text =
+        with_manifest(path, [](const Json& json) { return json.at("scene_text").get<std::string>(); });
+    const std::vector<RunInput> inputs = read_manifest(path).inputs;
+    if (inputs.empty()) return text;
+    Scene scene = read_scene_text(text, path.string() + ": scene_text", {}, {}, SceneUse::without_frames);
+    locate_inputs(scene, path.parent_path(), inputs);
+    return to_toml(scene);
 }
 
 std::map<int, std::vector<FileRecord>> read_frame_files(const std::filesystem::path& path) {
@@ -339,6 +377,7 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
         EarlierRun run;
         run.complete = json.at("complete").get<bool>();
         run.name = json.at("scene").at("name").get<std::string>();
+        run.scene_file = json.at("scene").value("file", std::string());
         run.scene_hash = json.at("scene").at("hash").get<std::string>();
         run.frames_hash = json.at("scene").value("frames_hash", run.scene_hash);  // not in those of earlier versions
         run.simulation_hash = json.at("scene").at("simulation_hash").get<std::string>();
@@ -352,6 +391,17 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
         if (json.contains("parameters")) {
             for (const auto& [key, value] : json.at("parameters").items())
                 run.parameters.emplace_back(key, value.get<std::string>());
+        }
+        if (json.contains("inputs")) {
+            for (const auto& [key, file] : json.at("inputs").items())
+                run.inputs.push_back(
+                    {key,
+                     file.at("path").get<std::string>(),
+                     {file.at("bytes").get<std::uint64_t>(), file.at("xxh3").get<std::string>()}});
+        }
+        if (json.contains("branch")) {
+            run.branch = branch_point(json.at("branch"), path.parent_path());
+            run.branch->next_frame = run.range.first_frame;
         }
         return run;
     } catch (const nlohmann::json::exception&) {

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "automaton/automaton.h"
 #include "core/digest.h"
 #include "simulation/run_folder.h"
+#include "simulation/run_inputs.h"
 
 namespace nephos {
 
@@ -52,6 +54,7 @@ struct ManifestState {
     std::string state_hash;  // at the last reported step
     std::vector<FrameRecord> frames;
     std::vector<FileRecord> run_files;  // of a complete run: those of no frame, but for the manifest
+    std::vector<RunInput> inputs;       // files that the scene names
     std::map<int, std::vector<RainRecord>> rain;  // by number of the frame; frames without rain left out
     double wall_s = 0;
     std::string backend, device;  // that drew; empty without pictures
@@ -76,7 +79,8 @@ int frame_number(const nlohmann::ordered_json& json, const std::filesystem::path
 // Returns whether a path of a list leads to something below the list's folder, without detours.
 bool is_inside_folder(const std::filesystem::path& path);
 
-// Returns the canonical text of the scene of an earlier run. Throws Error(io) as read_manifest().
+// Returns the canonical text of the scene of an earlier run, with the files that it names where they are seen from here.
+// Throws Error(io) as read_manifest(), and when the scene cannot be read.
 std::string read_scene_text_of(const std::filesystem::path& path);
 
 // Reads the files of the frames that the manifest of an earlier run lists; none for frames of a manifest that has no
@@ -86,13 +90,15 @@ std::map<int, std::vector<FileRecord>> read_frame_files(const std::filesystem::p
 // What a later run must know about an earlier one.
 struct EarlierRun {
     bool complete = false;
-    std::string name, scene_hash, frames_hash, simulation_hash;
+    std::string name, scene_file, scene_hash, frames_hash, simulation_hash;
     std::uint64_t scene_steps = 0;  // `time.steps` of its scene
     bool render = true;
     SimulationRange range;
     std::uint64_t steps_reported = 0;
     // Of scenes/format/writer.h: keys of its scene that are not at their defaults.
     std::vector<std::pair<std::string, std::string>> parameters;
+    std::vector<RunInput> inputs;       // none in manifests of earlier versions
+    std::optional<BranchPoint> branch;  // of a run that branched off another one
 };
 
 // Throws Error(io) when the file cannot be read or is no manifest.

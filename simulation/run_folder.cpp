@@ -19,6 +19,8 @@
 #include "simulation/folder_lock.h"
 #include "simulation/frame_output.h"
 #include "simulation/manifest.h"
+#include "simulation/run_inputs.h"
+#include "simulation/scene_files.h"
 #include "simulation/statistics_file.h"
 
 namespace nephos {
@@ -63,6 +65,9 @@ class Recorder : public SimulationSink {
     }
 
     void frame(const FrameResult& result) override { output_.add(result); }
+
+    // The files that the scene names, for the manifest.
+    void set_inputs(std::vector<RunInput> inputs) { state_.inputs = std::move(inputs); }
 
     // Frames whose files are all there.
     int frames_done() const { return frames_done_; }
@@ -390,11 +395,15 @@ bool wants_pictures(const Scene& scene) {
 }
 bool wants_video(const Scene& scene) { return scene.frames.enabled && scene.frames.video; }
 
-RunSettings run_settings(Scene scene, const std::string& scene_file) {
+RunSettings run_settings(Scene scene, const std::string& scene_file, RunStart from) {
     RunSettings settings;
-    SimulationStart start = simulation_start(scene);
-    settings.initial = std::move(start.initial);
-    settings.simulation_hash = std::move(start.simulation_hash);
+    if (from == RunStart::checkpoint) {
+        settings.simulation_hash = simulation_hash(scene, hash_of_files(with_files(scene)));
+    } else {
+        SimulationStart start = simulation_start(scene);
+        settings.initial = std::move(start.initial);
+        settings.simulation_hash = std::move(start.simulation_hash);
+    }
     settings.scene_file = std::filesystem::path(scene_file).filename().string();
     settings.scene_text = to_toml(scene);
     settings.scene_hash = scene_hash(scene);
@@ -425,11 +434,13 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     const FolderLock lock(folder.folder, "run");
     if (resumption == Resumption::nothing_there && !settings.overwrite) refuse_to_lose(folder, settings);
     if (lock.held()) remove_leftovers(folder);
+    std::vector<RunInput> inputs = inputs_of(settings);
     Simulation& simulation =
-        made.emplace(settings.resume   ? resumed_simulation(settings, folder)
+        made.emplace(settings.resume   ? resumed_simulation(settings, folder, inputs)
                      : settings.branch ? branched_simulation(settings, folder)
                                        : Simulation(settings.scene, settings.range, settings.simulation_hash,
                                                     std::move(settings.initial), settings.results()));
+    recorder.set_inputs(std::move(inputs));
     const std::uint64_t first_step = simulation.steps_taken();
     if (settings.resume) {
         recorder.take_over(simulation);

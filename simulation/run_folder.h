@@ -49,6 +49,16 @@ struct RunFolder {
 std::vector<std::filesystem::path> density_files(const RunFolder& folder, const Scene& scene, int frame);
 std::vector<std::filesystem::path> picture_files(const RunFolder& folder, const Scene& scene, int frame);
 
+// The checkpoint of another run that a run branches off (simulation/branch.h), and by what it is known.
+struct BranchPoint {
+    std::filesystem::path checkpoint;  // as the command named it
+    std::filesystem::path place;       // where it is seen from here; empty: there
+    // Of that checkpoint; empty and 0 in a manifest of an earlier version. Together they decide all that is in it.
+    std::string simulation_hash, state_hash;
+    std::uint64_t steps = 0;
+    int next_frame = 1;  // the first that the branch writes
+};
+
 struct RunSettings {
     Scene scene;
     std::optional<Lattice> initial;  // the state at step 0, when it is not the scene's own; taken by the run
@@ -61,8 +71,8 @@ struct RunSettings {
     bool render = true;            // pictures too
     DeviceOptions device{};        // what draws them, whatever scene.frames says
     std::filesystem::path folder;
-    // Start from this checkpoint of another run (simulation/branch.h); its state is part of simulation_hash.
-    std::optional<std::filesystem::path> branch{};
+    // Start from this checkpoint of another run; its state is part of simulation_hash.
+    std::optional<BranchPoint> branch{};
     // Go on from the folder's checkpoint; start where there is none, of nothing or of the same scene; do nothing where the
     // same run is complete.
     bool resume = false;
@@ -73,9 +83,15 @@ struct RunSettings {
     SimulationResults results() const;
 };
 
+// Where a run starts.
+enum class RunStart {
+    first_state,  // at step 0: a file that the scene names its state in is read
+    checkpoint,   // of a run to branch off: no such file is looked at
+};
+
 // Returns the settings of a run of the whole scene into out/NAME: its first state, text and hashes. `scene_file`
 // is where the scene comes from. Throws as read_state().
-RunSettings run_settings(Scene scene, const std::string& scene_file);
+RunSettings run_settings(Scene scene, const std::string& scene_file, RunStart from = RunStart::first_state);
 
 struct RunProgress {
     std::uint64_t steps = 0, steps_in_all = 0;

@@ -18,7 +18,11 @@ ListedFrame frame_of(const Json& json, const std::filesystem::path& manifest) {
     ListedFrame frame;
     frame.number = frame_number(json.at("number"), manifest);
     frame.time_s = json.at("time_s").get<double>();
-    frame.step = json.at("step").get<std::uint64_t>();
+    const Json& step = json.at("step");
+    if (step.is_number() && (!step.is_number_unsigned() || step.get<std::uint64_t>() > kMaxSteps))
+        throw Error(ErrorCode::io,
+                    manifest.string() + ": the step " + step.dump() + " of a frame is impossible");
+    frame.step = step.get<std::uint64_t>();
     frame.state_hash = json.at("state_hash").get<std::string>();
     return frame;
 }
@@ -41,6 +45,9 @@ RunListing read_run(const std::filesystem::path& folder) {
     run.complete = earlier.complete;
     run.render = earlier.render;
     run.range = earlier.range;
+    run.scene_file = earlier.scene_file;
+    run.inputs = earlier.inputs;
+    run.branch = earlier.branch;
     std::string text;
     const Json json = parsed_json(path);
     try {

@@ -25,12 +25,15 @@ struct ListedFrame {
 struct RunListing {
     std::filesystem::path folder;
     Scene scene;
+    std::string scene_file;  // its name, without a folder
     std::string scene_hash, frames_hash, simulation_hash, nephos_version;
     bool complete = false;
     bool render = false;
     SimulationRange range;
     std::vector<ListedFrame> frames;    // in the manifest's order
     std::vector<FileRecord> run_files;  // of a complete run
+    std::vector<RunInput> inputs;  // files that the scene names; none in a manifest of an earlier version
+    std::optional<BranchPoint> branch;  // of a run that branched off another one
 };
 
 // Returns true when the folder has a manifest of a run.

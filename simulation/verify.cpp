@@ -13,12 +13,16 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "automaton/checkpoint.h"
 #include "core/digest.h"
 #include "core/error.h"
 #include "density/combine.h"
 #include "density/vdb/vdb_file.h"
 #include "density/voxel_digest.h"
+#include "scenes/format/errors.h"
 #include "scenes/format/writer.h"
+#include "simulation/branch.h"
+#include "simulation/run_inputs.h"
 #include "simulation/run_listing.h"
 #include "simulation/scene_place.h"
 #include "simulation/verify_motion.h"
@@ -352,16 +356,60 @@ class Replay : public SimulationSink {
     bool plain_ = true, half_ = false;
 };
 
+// Returns the simulation of a branch as it began.
+Simulation branch_anew(const RunListing& run, const Scene& scene) {
+    const BranchPoint& point = *run.branch;
+    const std::filesystem::path file = point.place.empty() ? point.checkpoint : point.place;
+    std::error_code error;
+    if (!std::filesystem::exists(file, error))
+        throw Error(ErrorCode::io,
+                    fmt::format("{}: the checkpoint that the run branched off is not there any more",
+                                point.checkpoint.string()));
+    const Checkpoint checkpoint = read_checkpoint(file);
+    if (!is_branch_point(checkpoint, point, scene, run.simulation_hash))
+        throw Error(
+            ErrorCode::io,
+            fmt::format(
+                "{}: is not the checkpoint any more that the run branched off, but one after {} steps of a "
+                "run that went on or began anew",
+                point.checkpoint.string(), checkpoint.steps));
+    return {scene,          run.range, run.simulation_hash, checkpoint, SimulationResults::everything,
+            Restart::branch};
+}
+
+// Returns the simulation of frames from step 0 on.
+Simulation run_anew(const RunListing& run, const Scene& scene, const SimulationRange& range) {
+    SimulationStart start = simulation_start(scene);
+    if (start.simulation_hash != run.simulation_hash) {
+        const std::vector<RunInput> now =
+            inputs_of(scene, run.folder, {.first_states = true, .pictures = false});
+        const std::string changed =
+            changed_inputs(run.inputs, now, {InputKind::first_state, InputKind::simulation});
+        if (!changed.empty()) throw Error(ErrorCode::io, "the content is not as it was: " + changed);
+        if (run.inputs.empty() && !now.empty())
+            throw Error(ErrorCode::io,
+                        "the files that the scene names are others than those of the run, whose manifest is "
+                        "of an earlier version and does not say which");
+    }
+    return {scene, range, run.simulation_hash, std::move(start.initial)};
+}
+
 Check replay_frames(const RunListing& run, int count) {
     Replay sink(run);
     try {
         if (run.frames.empty()) return {"replay", true, "there is no frame to simulate"};
         const int first = run.frames.front().number;
         const int last = std::min(run.frames.back().number, first + count - 1);
-        Simulation simulation(run.scene, range_of_frames(run.scene, first, last), run.simulation_hash);
-        while (!simulation.finished()) simulation.advance(sink);
+        Scene scene = run.scene;
+        locate_inputs(scene, run.folder, run.inputs);
+        Simulation simulation =
+            run.branch ? branch_anew(run, scene) : run_anew(run, scene, range_of_frames(scene, first, last));
+        while (!simulation.finished() && simulation.next_frame() <= last) simulation.advance(sink);
     } catch (const Error& error) {
-        return {"replay", false, error.what()};
+        const auto* errors = dynamic_cast<const SceneErrors*>(&error);
+        const std::string text = errors != nullptr ? errors->problems().front().message : error.what();
+        if (error.code() != ErrorCode::io) return {"replay", false, text};
+        return {"replay", false, "cannot be done: " + text, {}, false};
     }
     return sink.problems.check(
         "replay", fmt::format("{} frames simulated anew have the same states and voxels", sink.count));
@@ -371,6 +419,10 @@ Check replay_frames(const RunListing& run, int count) {
 
 bool Verification::passed() const {
     return std::ranges::all_of(checks, [](const Check& check) { return check.passed; });
+}
+
+bool Verification::failed() const {
+    return std::ranges::any_of(checks, [](const Check& check) { return check.done && !check.passed; });
 }
 
 Seam seam_of(const std::vector<float>& density, int nx, int ny, int nz, int axis) {

@@ -19,13 +19,17 @@ struct Check {
     std::string detail;  // what was found: what is wrong first, then figures
     // The figures of a check that measures, by name.
     std::vector<std::pair<std::string, double>> figures{};
+    // False: what it takes is not there any more, so that nothing was judged. It has not passed then, and `detail` says why.
+    bool done = true;
 };
 
 struct VerifyOptions {
     bool hashes_only = false;  // of files: nothing is decoded
     // Another run that must have the same voxels and states, frame by frame, with whatever compression.
     std::optional<std::filesystem::path> against;
-    int replay = 0;  // frames to simulate anew and to compare, from the first on; 0: none
+    // Frames to simulate anew and to compare, from the first on; 0: none. It takes the files that the scene starts from, and
+    // of a branch the checkpoint of the other run that it began with, both as they were.
+    int replay = 0;
     // The largest change of a voxel from frame to frame that passes; none: it is reported and always passes.
     std::optional<double> max_change;
     // Makes a seam that is rougher than the inside a failure, also of an axis that is not periodic.
@@ -35,7 +39,8 @@ struct VerifyOptions {
 struct Verification {
     std::string kind;  // "run" or "export"
     std::vector<Check> checks;
-    bool passed() const;
+    bool passed() const;  // all of them
+    bool failed() const;  // one that was done has not passed
 };
 
 // Checks a run. Reads one frame after the other; keeps two. Throws Error(io) when its manifest cannot be read, and

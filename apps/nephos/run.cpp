@@ -21,6 +21,7 @@
 #include "simulation/branch.h"
 #include "simulation/memory.h"
 #include "simulation/run_folder.h"
+#include "simulation/run_listing.h"
 
 namespace nephos {
 namespace {
@@ -38,13 +39,36 @@ struct RunArguments {
     WorkArguments work;
 };
 
-Scene scene_of(const RunArguments& a) {
+// The run of an earlier call that this one goes on with.
+struct Continued {
+    std::optional<BranchPoint> branch;  // where it branched off
+    bool has_scene = false;             // SCENE is left out: it is that of the run, in --out
+};
+
+Continued continued_run(const RunArguments& a) {
+    Continued run;
+    if (!a.resume || a.out.empty()) return run;
+    run.branch = branch_in(a.out, a.from);
+    run.has_scene = a.scene.file.empty() && (run.branch || (a.from.empty() && is_run_folder(a.out)));
+    if (run.has_scene && !run.branch && read_run(a.out).branch)
+        throw Error(
+            ErrorCode::usage,
+            a.out +
+                ": the run there branched off another one, and left no checkpoint of its own to go on from: "
+                "expected --from with the other one");
+    return run;
+}
+
+Scene scene_of(const RunArguments& a, const Continued& continued) {
     const SceneUse use = a.statistics_only ? SceneUse::without_frames : SceneUse::everything;
-    if (a.scene.file.empty() && a.from.empty())
-        throw Error(ErrorCode::usage, "SCENE is missing: expected a scene file, or --from with the run to branch off");
+    if (a.scene.file.empty() && a.from.empty() && !continued.has_scene)
+        throw Error(ErrorCode::usage,
+                    "SCENE is missing: expected a scene file, --from with the run to branch off, or "
+                    "--resume with the folder of a run as --out");
     Scene scene;
     if (a.scene.file.empty()) {
-        scene = read_scene_text(scene_text_beside(a.from), "scene_text of " + a.from, {}, a.scene.overrides, use);
+        const std::string& from = continued.has_scene ? a.out : a.from;
+        scene = read_scene_text(scene_text_beside(from), "scene_text of " + from, {}, a.scene.overrides, use);
         if (a.scene.seed) scene.automaton.seed = *a.scene.seed;
     } else {
         scene = load_scene(a.scene, use);
@@ -60,7 +84,7 @@ Scene scene_of(const RunArguments& a) {
 
 // For scripts that install what is missing (./run): the scene and --set decide as much as the options do.
 void print_needs(const RunArguments& a) {
-    const Scene scene = scene_of(a);
+    const Scene scene = scene_of(a, continued_run(a));
     Output output;
     const bool render = !a.no_render && !a.statistics_only;
     if (render && wants_pictures(scene) && needs_vulkan(device_options(a.device, scene.frames)))
@@ -69,14 +93,24 @@ void print_needs(const RunArguments& a) {
 }
 
 RunSettings settings_of(const RunArguments& a) {
-    Scene scene = scene_of(a);
+    const Continued continued = continued_run(a);
+    Scene scene = scene_of(a, continued);
     check_memory(scene, a.statistics_only ? RunParts::statistics
                         : a.no_render     ? RunParts::density
                                           : RunParts::pictures);
-    RunSettings settings = run_settings(std::move(scene), a.scene.file);
+    const std::string scene_file = continued.has_scene ? read_run(a.out).scene_file : a.scene.file;
+    RunSettings settings =
+        run_settings(std::move(scene), scene_file,
+                     continued.branch || !a.from.empty() ? RunStart::checkpoint : RunStart::first_state);
     if (a.frames) settings.range = range_of_frames(settings.scene, a.frames->first, a.frames->last);
     if (!a.out.empty()) settings.folder = a.out;
-    if (!a.from.empty()) branch_off(settings, a.from);
+    if (continued.branch && (a.frames || a.until))
+        throw Error(ErrorCode::usage, a.out + ": is a branch of another run: leave out --frames and --until");
+    if (continued.branch) {
+        branch_off(settings, *continued.branch);
+    } else if (!a.from.empty()) {
+        branch_off(settings, a.from);
+    }
     settings.statistics_only = a.statistics_only;
     settings.render = !a.no_render && !a.statistics_only;
     settings.device = device_options(a.device, settings.scene.frames);
@@ -200,6 +234,8 @@ int run(const RunArguments& a) {
     if (a.max_steps && !a.until) throw Error(ErrorCode::usage, "--max-steps is for --until");
     if (a.statistics_only && (a.frames || a.video))
         throw Error(ErrorCode::usage, "--statistics-only writes no frames: leave out --frames and --video");
+    if (a.no_render && a.video)
+        throw Error(ErrorCode::usage, "--no-render draws no pictures for --video: leave out one of them");
     if (a.needs) {
         print_needs(a);
         return 0;
@@ -259,11 +295,17 @@ void add_run_command(CLI::App& app, Action& action) {
     const auto a = std::make_shared<RunArguments>();
     add_scene_arguments(*command, a->scene);
     command->get_option("SCENE")->required(false);
-    command->add_option("--from", a->from,
-                        "Branch off another run: start from its checkpoint (its folder, or the file) with the scene that "
-                        "--set changes; without SCENE that of the run. Needs --out")
+    command
+        ->add_option(
+            "--from", a->from,
+            "Branch off another run: start from its checkpoint (its folder, or the file) with the scene that "
+            "--set changes; without SCENE that of the run. Needs --out; with --resume not needed any more")
         ->type_name("RUN");
-    command->add_option("-o,--out", a->out, "Folder to write to (default: out/NAME)")->type_name("DIR");
+    add_value(*command, "-o,--out", "DIR", "Folder to write to (default: out/NAME)",
+              [a](const std::string& text) {
+                  if (text.empty()) throw Error(ErrorCode::usage, "'': expected the path of a folder");
+                  a->out = text;
+              });
     add_value(*command, "--frames", "A..B",
               "Write only these frames, counted from 1; A.., ..B and A alone work too",
               [a](const std::string& text) { a->frames = parse_frames(text); });
@@ -280,7 +322,9 @@ void add_run_command(CLI::App& app, Action& action) {
     command->add_flag(
         "--resume", a->resume,
         "Go on where an interrupted run stopped, or with more time.steps where a run ended; start "
-        "where nothing is there, and do nothing where the same run is complete");
+        "where nothing is there, and do nothing where the same run is complete; without SCENE with that of "
+        "the run in "
+        "--out");
     command->add_flag(
         "--overwrite", a->overwrite,
         "Start anew although the folder holds an interrupted run, a run of another scene or seed, or files "

@@ -91,9 +91,12 @@ void add_state_command(CLI::App& app, Action& action) {
         app.add_subcommand("state", "Write the automaton's bits after some steps as a VDB file");
     const auto a = std::make_shared<StateArguments>();
     add_scene_arguments(*command, a->scene);
-    command->add_option("-o,--out", a->out, "VDB file to write: the bool grids hum, act and cld")
-        ->required()
-        ->type_name("FILE.vdb");
+    add_value(*command, "-o,--out", "FILE.vdb", "VDB file to write: the bool grids hum, act and cld",
+              [a](const std::string& text) {
+                  if (text.empty()) throw Error(ErrorCode::usage, "'': expected the path of a file");
+                  a->out = text;
+              })
+        ->required();
     add_value(*command, "-n,--steps", "N", "Steps to take (default: the scene's)",
               [a](const std::string& text) { a->steps = parse_unsigned(text, 0, kMaxSteps); });
     command

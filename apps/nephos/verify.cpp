@@ -39,8 +39,10 @@ int verify(const VerifyArguments& a) {
     if (a.work.json) {
         nlohmann::ordered_json checks = nlohmann::ordered_json::array();
         for (const Check& check : result.checks) {
-            nlohmann::ordered_json json = {
-                {"name", check.name}, {"passed", check.passed}, {"detail", check.detail}};
+            nlohmann::ordered_json json = {{"name", check.name},
+                                           {"passed", check.passed},
+                                           {"done", check.done},
+                                           {"detail", check.detail}};
             for (const auto& [name, value] : check.figures) json["figures"][name] = value;
             checks.push_back(std::move(json));
         }
@@ -50,12 +52,17 @@ int verify(const VerifyArguments& a) {
         const bool colours = colours_on(stdout);
         for (const Check& check : result.checks) {
             output.write_styled(fmt::format("  {}  {:9} {}\n",
-                                            check.passed ? "ok  " : styled("FAIL", Style::red, colours),
+                                            check.passed  ? "ok  "
+                                            : !check.done ? "none"
+                                                          : styled("FAIL", Style::red, colours),
                                             check.name, escaped_lines(check.detail)));
         }
     }
     output.flush();
     if (result.passed()) return 0;
+    if (!result.failed())
+        throw Error(ErrorCode::io,
+                    a.folder + ": nothing is wrong, but the run cannot be simulated anew: see `replay`");
     throw Error(ErrorCode::check, a.folder + ": the " + result.kind + " is not what it claims to be");
 }
 
@@ -95,7 +102,11 @@ void add_verify_command(CLI::App& app, Action& action) {
         "read\n"
         "back from each file against those of the source, within the error of their type.\n"
         "\n"
-        "Exit status 0: everything holds; 1: a check failed; 3: the folder cannot be read.\n"
+        "Exit status 0: everything holds; 1: a check failed; 3: the folder cannot be read, or all holds but "
+        "for --replay,\n"
+        "which could not be done: it takes the files that the scene names, and of a branch (run --from) the "
+        "checkpoint that\n"
+        "it began with, as they were.\n"
         "\n"
         "Examples:\n"
         "  nephos verify out/cumulus\n"

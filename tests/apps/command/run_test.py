@@ -6,11 +6,12 @@ import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 import time
 import unittest
 
-from case import Case, LONG, NEPHOS, rows_of, SCENE, voxels
+from case import Case, LONG, NEPHOS, rows_of, SCENE, SOURCE, voxels
 
 
 class Run(Case):
@@ -108,6 +109,174 @@ class Run(Case):
             self.assertEqual({path: path.read_bytes() for path in (self.folder / "rows").iterdir()}, before)
             self.call(*command)
             self.assertEqual(table.read_bytes(), whole)
+
+
+    def test_what_cannot_be_is_refused(self):
+        self.refused(2, "run", self.scene, "--video", "--no-render", "--out", "out",
+                     says="--no-render draws no pictures for --video")
+        self.refused(2, "run", self.scene, "--no-render", "--out", "", says="--out '': expected the path of a folder")
+        self.refused(2, "state", self.scene, "--out", "", says="--out '': expected the path of a file")
+        self.assertEqual([p.name for p in self.folder.iterdir()], ["tiny.toml"])
+
+
+class Inputs(Case):
+    """Files that a scene names, replaced between two calls of a run."""
+
+    SHORT = ("--set", "time.steps=3")
+    SMALL = ("--splatting", "cpu", "--set", "camera.width=24", "--set", "camera.height=16")
+
+    def replaced(self, scene, key, name, other, *options):
+        """A run whose file is another one when it is to go on."""
+        out = self.folder / "out"
+        run = ["run", scene, *options, "--out", "out"]
+        for more in ([], ["--frames", "1..3"]):
+            shutil.rmtree(out, ignore_errors=True)
+            first = (self.folder / name).read_bytes()
+            self.call(*run, *self.SHORT, *more)
+            manifest = json.loads((out / "manifest.json").read_text())
+            self.assertEqual(manifest["inputs"][key]["path"], f"../{name}")
+            self.assertEqual(manifest["inputs"][key]["bytes"], len(first))
+            before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+            (self.folder / name).write_bytes(other)
+            longer = self.SHORT if more else ()
+            refused = self.refused(2, *run, *longer, *more, "--resume", says=f"{pathlib.Path(name).name} of `{key}`")
+            self.assertIn("--overwrite", refused.stderr)
+            self.assertEqual({path: path.read_bytes() for path in out.rglob("*") if path.is_file()}, before)
+            (self.folder / name).write_bytes(first)
+            self.call(*run, *longer, *more, "--resume")
+            (self.folder / name).write_bytes(other)
+            self.call(*run, *longer, *more, "--overwrite")
+            (self.folder / name).write_bytes(first)
+        return manifest
+
+    def test_heights_of_the_ground(self):
+        def heights(factor):
+            return struct.pack("<256H", *[factor * (n % 7) for n in range(256)])
+        (self.folder / "heights.raw").write_bytes(heights(100))
+        scene = "hills.toml"
+        self.write(scene, SCENE + '[ground]\nheight_map = "heights.raw"\n[terrain]\nraw_columns = 16\n'
+                   "raw_rows = 16\n")
+        self.replaced(scene, "ground.height_map", "heights.raw", heights(2000), *self.SMALL)
+        # They count for pictures alone, and a manifest of an earlier version says nothing of them.
+        self.call("run", scene, "--no-render", "--out", "plain", *self.SHORT)
+        (self.folder / "heights.raw").write_bytes(heights(2000))
+        self.call("run", scene, "--no-render", "--out", "plain", "--resume")
+        path = self.folder / "out/manifest.json"
+        self.call("run", scene, *self.SMALL, "--out", "out", *self.SHORT, "--overwrite")
+        manifest = json.loads(path.read_text())
+        del manifest["inputs"]
+        path.write_text(json.dumps(manifest))
+        (self.folder / "heights.raw").write_bytes(heights(100))
+        self.call("run", scene, *self.SMALL, "--out", "out", "--resume")
+        self.assertIn("ground.height_map", json.loads(path.read_text())["inputs"])
+
+    def test_textures(self):
+        shutil.copytree(SOURCE / "scenes/torchelsen", self.folder / "t")
+        other = (self.folder / "t/textures/heap-3.png").read_bytes()
+        options = [*self.SMALL, "--set", "frames.count=0", "--set", "frames.per_second=1", "--set", "frames.time_scale=10",
+                   "--set", "frames.start_s=0", "--set", "time.step_s=10"]
+        self.SHORT = ("--set", "time.steps=2")
+        self.replaced("t/painted.toml", "model[0].textures[1]", "t/textures/heap-2.png", other, *options, "--set",
+                      "time.steps=4")
+
+    def test_probabilities(self):
+        """In files of the simulation the values count: those of other bytes are the same."""
+        self.call("run", self.scene, "--no-render", "--out", "grids", *self.SHORT)
+        files = [self.folder / f"grids/density/tiny_000{n}.vdb" for n in (2, 3)]
+        shutil.copy(files[0], self.folder / "p.vdb")
+        scene = "p.toml"
+        self.write(scene, SCENE + '[[field.grids]]\nof = "ext"\nfile = "p.vdb"\ngrid = "density"\n')
+        self.replaced(scene, "field.grids[0].file", "p.vdb", files[1].read_bytes(), "--no-render")
+
+
+class Branch(Case):
+    """Runs that branch off another one."""
+
+    BRANCH = ("--no-render", "--set", "field.background.ext=0.06", "--set", "time.steps=3000")
+
+    def begin(self):
+        """A branch that was interrupted, and the same one that was not."""
+        self.scene = self.write("tiny.toml", LONG.replace("steps = 10000", "steps = 6"))
+        self.call("run", self.scene, "--no-render", "--out", "source")
+        self.call("run", "--from", "source", *self.BRANCH, "--out", "whole")
+        process = subprocess.Popen([NEPHOS, "run", "--from", "source", *self.BRANCH, "--out", "part"], cwd=self.folder,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.environment)
+        end = time.monotonic() + 60
+        while not (self.folder / "part/density/tiny_0003.vdb").exists():
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.002)
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 128 + signal.SIGTERM, errors)
+
+    def goes_on(self, *arguments):
+        """From a copy of what was interrupted. The manifest has the checksums of all files."""
+        copy = self.folder / "copy"
+        shutil.rmtree(copy, ignore_errors=True)
+        shutil.copytree(self.folder / "part", copy)
+        self.call("run", *arguments, "--out", "copy", "--resume")
+        manifests = [json.loads((self.folder / name / "manifest.json").read_text()) for name in ("whole", "copy")]
+        for manifest in manifests:
+            self.assertTrue(manifest.pop("complete"))
+            del manifest["timing"]
+        self.assertEqual(*manifests)
+
+    def test_goes_on_without_the_other_run(self):
+        self.begin()
+        ways = [("--from", "source", *self.BRANCH), ("--from", "source/checkpoint.nephos", *self.BRANCH), ("--no-render",)]
+        def all_go_on():
+            for way in ways:
+                with self.subTest(way):
+                    self.goes_on(*way)
+        all_go_on()
+        self.call("run", self.scene, "--no-render", "--out", "source", "--set", "time.steps=20", "--resume")
+        all_go_on()
+        self.refused(2, "run", "--from", "source", *self.BRANCH, "--set", "field.background.act=0.5", "--out", "copy",
+                     "--resume", says="`field.background.act` was 0.01, now 0.5")
+        self.call("run", self.scene, "--no-render", "--out", "other", "--seed", 9)
+        self.refused(2, "run", "--from", "other", *self.BRANCH, "--out", "copy", "--resume",
+                     says="branched off source/checkpoint.nephos, not other")
+        shutil.rmtree(self.folder / "source")
+        all_go_on()
+        self.refused(3, "run", "--from", "nowhere", *self.BRANCH, "--out", "copy", "--resume", says="nowhere: no such run")
+        # Without a checkpoint of its own it needs the other run.
+        (self.folder / "copy/checkpoint.nephos").unlink()
+        self.refused(2, "run", "--no-render", "--out", "copy", "--resume", says="left no checkpoint of its own")
+
+    def test_a_run_goes_on_with_its_own_scene(self):
+        self.call("run", self.scene, "--no-render", "--out", "whole")
+        self.call("run", self.scene, "--no-render", "--out", "part", "--set", "time.steps=3")
+        self.call("run", "--no-render", "--out", "part", "--set", "time.steps=6", "--resume")
+        self.same_runs("whole", "part")
+        self.refused(2, "run", "--no-render", "--out", "none", "--resume", says="SCENE is missing")
+        self.refused(2, "run", "--no-render", "--out", "part", says="SCENE is missing")
+
+    def test_needs_no_state_and_finds_the_files_of_the_scene(self):
+        """Called in another folder than the run that it branches off, whose initial state is gone."""
+        self.call("run", self.scene, "--no-render", "--out", "in/grids", "--set", "time.steps=3")
+        shutil.copy(self.folder / "in/grids/density/tiny_0002.vdb", self.folder / "in/p.vdb")
+        self.call("state", self.scene, "--steps", 4, "--out", "in/state.vdb")
+        self.write("in/files.toml", SCENE.replace("[time]", 'initial_state = "state.vdb"\n[time]') +
+                   '[[field.grids]]\nof = "ext"\nfile = "p.vdb"\ngrid = "density"\n')
+        self.call("run", "in/files.toml", "--no-render", "--out", "source", "--set", "time.steps=3")
+        self.call("run", "--from", "source", "--no-render", "--out", "here", "--set", "time.steps=6")
+        self.call("run", "in/files.toml", "--no-render", "--out", "longer")
+        (self.folder / "in/state.vdb").unlink()
+        for name in ("in", "elsewhere"):
+            (self.folder / name).mkdir(exist_ok=True)
+            subprocess.run([NEPHOS, "run", "--from", "../source", "--no-render", "--out", f"../from {name}", "--set",
+                            "time.steps=6"], cwd=self.folder / name, check=True, env=self.environment,
+                           stdout=subprocess.DEVNULL)
+        for name in ("here", "from in", "from elsewhere"):
+            rows = (self.folder / name / "statistics.csv").read_text()
+            self.assertEqual(rows, (self.folder / "longer/statistics.csv").read_text())
+            self.call("verify", name, "--replay", 2)
+        # No other file of that name is taken, wherever one is called.
+        shutil.copy(self.folder / "in/grids/density/tiny_0003.vdb", self.folder / "elsewhere/p.vdb")
+        subprocess.run([NEPHOS, "run", "--from", "../from elsewhere", "--no-render", "--out", "../twig",
+                        "--set", "time.steps=6"], cwd=self.folder / "elsewhere", check=True, env=self.environment,
+                       stdout=subprocess.DEVNULL)
+        self.assertEqual((self.folder / "twig/statistics.csv").read_text(), rows)
 
 
 class Memory(Case):

@@ -3,9 +3,10 @@
 
 import json
 import shutil
+import subprocess
 import unittest
 
-from case import Case, SCENE
+from case import Case, NEPHOS, SCENE
 
 PLACED = SCENE + """\
 [georeference]
@@ -139,6 +140,8 @@ class Verify(Case):
         for number in (2147483647, -2147483648, 10**18, 2**64 - 1, 1e300, 1.5):
             refused(lambda m: m["range"].update(last_frame=number), f"whole/manifest.json: the frame's number {number}"[:60])
             refused(lambda m: m["frames"][1].update(number=number), "the frame's number")
+        for step in (-1, 2**64 - 1, 1.5):
+            refused(lambda m: m["frames"][1].update(step=step), f"whole/manifest.json: the step {step} of a frame"[:60])
         for path in ("../secret", "/etc/hostname", "density/../../secret", ""):
             refused(lambda m: m["frames"][1]["files"][0].update(path=path), "which is none of its folder")
         long = "../" + "x\u001b[2J" * 100_000
@@ -191,6 +194,102 @@ class Verify(Case):
                               (["density.velocity_name=cld"], "velocity_name")):
             overrides = [word for change in changes for word in ("--set", change)]
             self.assertIn(says, self.call("run", scene, *overrides, status=2).stderr)
+
+
+class Replay(Case):
+    """Frames simulated anew, of runs that take more than their scene's text."""
+
+    def replay(self, folder, status=0, frames=3, **options):
+        """The check, and all that the command says on stderr."""
+        result = self.call("verify", folder, "--replay", frames, "--json", status=status, **options)
+        checks = {check["name"]: check for check in json.loads(result.stdout)["checks"]}
+        self.assertEqual([name for name, check in checks.items() if not check["passed"]], ["replay"] if status else [])
+        self.assertEqual(checks["replay"]["done"], status != 3)
+        return checks["replay"]["detail"], result.stderr
+
+    def state(self, path, steps):
+        self.call("state", self.scene, "--steps", steps, "--out", path)
+
+    def test_of_a_run_that_starts_from_a_state(self):
+        (self.folder / "in").mkdir()
+        self.state("in/state.vdb", 4)
+        scene = self.write("in/from.toml", SCENE.replace("[time]", 'initial_state = "state.vdb"\n[time]'))
+        absolute = self.write("absolute.toml",
+                              SCENE.replace("[time]", f'initial_state = "{self.folder}/in/state.vdb"\n[time]'))
+        changed = ("--set", "lattice.initial_state=in/state.vdb")
+        self.call("run", "in/from.toml", "--no-render", "--out", "relative")
+        self.call("run", scene, "--no-render", "--out", "full")
+        self.call("run", absolute, "--no-render", "--out", "absolute")
+        self.call("run", self.scene, *changed, "--no-render", "--out", "changed")
+        for folder in ("relative", "full", "absolute", "changed"):
+            with self.subTest(folder):
+                self.replay(folder)
+                # From another folder, too.
+                subprocess.run([NEPHOS, "verify", f"../{folder}", "--replay", "1"], cwd=self.folder / "in", check=True,
+                               env=self.environment, stdout=subprocess.DEVNULL)
+        # A state written anew with the same cells is the same; another one, or none, is nothing to judge by.
+        self.state("in/state.vdb", 4)
+        self.replay("relative")
+        path = self.folder / "changed/manifest.json"
+        manifest = json.loads(path.read_text())
+        manifest["frames"][0]["state_hash"] = "0" * 32
+        path.write_text(json.dumps(manifest))
+        self.assertIn("frame 1: state", self.call("verify", "changed", "--replay", 1, status=1).stdout)
+        self.state("in/state.vdb", 5)
+        for folder in ("relative", "full", "absolute"):
+            detail, errors = self.replay(folder, status=3)
+            self.assertIn("cannot be done: the content is not as it was: state.vdb of `lattice.initial_state`", detail)
+            self.assertIn("cannot be simulated anew", errors)
+        (self.folder / "in/state.vdb").unlink()
+        for folder in ("relative", "full", "absolute"):
+            detail, _ = self.replay(folder, status=3)
+            self.assertIn("cannot be done: ", detail)
+            self.assertIn("state.vdb", detail)
+
+    def test_of_a_manifest_without_inputs(self):
+        """As those of earlier versions: the state counts, wherever the scene's text finds it."""
+        self.state("state.vdb", 4)
+        self.call("run", self.scene, "--set", "lattice.initial_state=state.vdb", "--no-render", "--out", "out")
+        path = self.folder / "out/manifest.json"
+        manifest = json.loads(path.read_text())
+        self.assertEqual(manifest["inputs"]["lattice.initial_state"]["path"], "../state.vdb")
+        del manifest["inputs"]
+        path.write_text(json.dumps(manifest))
+        self.replay("out")
+        self.state("state.vdb", 5)
+        self.assertIn("earlier version", self.replay("out", status=3)[0])
+
+    def test_of_a_branch(self):
+        self.call("run", self.scene, "--no-render", "--out", "source", "--frames", "1", "--set", "time.steps=12")
+        self.call("run", "--from", "source", "--no-render", "--out", "branch", "--set", "field.background.ext=0.3")
+        self.call("run", "--from", "branch/checkpoint.nephos", "--no-render", "--out", "twig", "--set", "time.steps=18",
+                  "--set", "field.background.ext=0.05")
+        manifest = json.loads((self.folder / "branch/manifest.json").read_text())
+        self.assertEqual(manifest["branch"]["path"], "../source/checkpoint.nephos")
+        for folder in ("branch", "twig"):
+            self.assertIn("3 frames simulated anew", self.replay(folder)[0])
+        (self.folder / "elsewhere").mkdir()
+        subprocess.run([NEPHOS, "verify", "../twig", "--replay", "1"], cwd=self.folder / "elsewhere", check=True,
+                       env=self.environment, stdout=subprocess.DEVNULL)
+
+        def rewritten(change):
+            other = json.loads(json.dumps(manifest))
+            change(other)
+            (self.folder / "branch/manifest.json").write_text(json.dumps(other))
+        # A manifest of an earlier version has the checkpoint's name alone.
+        rewritten(lambda m: m.update(branch={"checkpoint": "source/checkpoint.nephos"}))
+        self.replay("branch")
+        rewritten(lambda m: m["frames"][1].update(state_hash="0" * 32))
+        self.assertIn("frame 3: state", self.call("verify", "branch", "--replay", 3, status=1).stdout)
+        for change in (lambda m: None, lambda m: m.update(branch={"checkpoint": "source/checkpoint.nephos"})):
+            rewritten(change)
+            kept = (self.folder / "source/checkpoint.nephos").read_bytes()
+            self.call("run", self.scene, "--no-render", "--out", "source", "--overwrite")
+            self.assertIn("is not the checkpoint any more", self.replay("branch", status=3)[0])
+            (self.folder / "source/checkpoint.nephos").unlink()
+            self.assertIn("is not there any more", self.replay("branch", status=3)[0])
+            (self.folder / "source/checkpoint.nephos").write_bytes(kept)
+            self.replay("branch")
 
 
 class Place(Case):

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/run_inputs.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "scenes/format/text.h"
+#include "simulation/scene_files.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kNamed = 3;
+
+// Calls use(key, kind, path) for each file that a scene names, and takes the path that it returns.
+template <class Use>
+void for_each_file(Scene& scene, const Use& use) {
+    const auto one = [&](const std::string& key, InputKind kind, std::optional<fs::path>& file) {
+        if (file) file = use(key, kind, *file);
+    };
+    const auto many = [&](const std::string& list, InputKind kind, std::vector<std::string>& files) {
+        for (std::size_t n = 0; n < files.size(); ++n) files[n] = use(indexed(list, n), kind, fs::path(files[n])).string();
+    };
+    const std::string state = "lattice.initial_state";
+    one(state, InputKind::first_state, scene.initial_state_file);
+    for (std::size_t n = 0; n < scene.layers.size(); ++n)
+        one(indexed("layer", n) + "." + state, InputKind::first_state, scene.layers[n].initial_state_file);
+    for (std::size_t n = 0; n < scene.automaton.wind.fields.size(); ++n)
+        many(indexed("wind_field", n) + ".files", InputKind::simulation, scene.automaton.wind.fields[n].files);
+    for (std::size_t n = 0; n < scene.automaton.field.grids.size(); ++n)
+        one(indexed("field.grids", n) + ".file", InputKind::simulation, scene.automaton.field.grids[n].file);
+    for (std::size_t n = 0; n < scene.models.size(); ++n)
+        many(indexed("model", n) + ".textures", InputKind::picture, scene.models[n].textures);
+    one("ground.height_map", InputKind::picture, scene.render.terrain.height_map);
+}
+
+// Returns the absolute path, with the links of what is there of it resolved where that can be.
+fs::path resolved(const fs::path& path) {
+    std::error_code error;
+    const fs::path whole = fs::absolute(path, error);
+    fs::path found = fs::weakly_canonical(whole, error);
+    return error ? whole : found;
+}
+
+// Returns the key as the places of a scene's files have it: a list may be one text.
+std::string placed_key(const Scene& scene, const std::string& key) {
+    const std::size_t bracket = key.rfind('[');
+    if (scene.file_places.of_key.contains(key) || bracket == key.npos || !key.ends_with(']')) return key;
+    const std::string list = key.substr(0, bracket);
+    return scene.file_places.of_key.contains(list) ? list : key;
+}
+
+}  // namespace
+
+fs::path path_from(const fs::path& folder, const fs::path& file) {
+    return file.is_absolute() ? file : resolved(file).lexically_relative(resolved(folder));
+}
+
+fs::path path_of(const fs::path& folder, const fs::path& named) {
+    return named.is_absolute() ? named : (resolved(folder) / named).lexically_normal();
+}
+
+std::vector<RunInput> inputs_of(const Scene& scene, const fs::path& folder, const InputUse& use) {
+    std::vector<RunInput> inputs;
+    std::map<fs::path, FileDigest> digests;
+    Scene named = scene;
+    for_each_file(named, [&](const std::string& key, InputKind kind, const fs::path& file) {
+        if ((kind == InputKind::first_state && !use.first_states) || (kind == InputKind::picture && !use.pictures))
+            return file;
+        const auto [found, added] = digests.try_emplace(file);
+        if (added) found->second = read_at_key(scene, placed_key(scene, key), [&] { return file_digest(file); });
+        inputs.push_back({key, path_from(folder, file), found->second, kind});
+        return file;
+    });
+    return inputs;
+}
+
+std::vector<RunInput> inputs_of(const RunSettings& settings) {
+    return inputs_of(settings.scene, settings.folder, {.first_states = !settings.branch, .pictures = settings.render});
+}
+
+std::string changed_inputs(const std::vector<RunInput>& before, const std::vector<RunInput>& now,
+                           const std::vector<InputKind>& kinds) {
+    std::map<std::string, FileDigest> then;
+    for (const RunInput& input : before) then[input.key] = input.digest;
+    std::vector<std::string> names;
+    for (const RunInput& input : now) {
+        const auto found = then.find(input.key);
+        if (found == then.end() || found->second == input.digest || std::ranges::count(kinds, input.kind) == 0) continue;
+        names.push_back(fmt::format("{} of `{}`", input.path.filename().string(), input.key));
+    }
+    const std::size_t more = names.size() > kNamed ? names.size() - kNamed : 0;
+    names.resize(names.size() - more);
+    return fmt::format("{}{}", fmt::join(names, ", "), more > 0 ? fmt::format(" and {} more", more) : "");
+}
+
+void locate_inputs(Scene& scene, const fs::path& folder, const std::vector<RunInput>& inputs) {
+    std::map<std::string, fs::path> places;
+    for (const RunInput& input : inputs) places[input.key] = path_of(folder, input.path);
+    for_each_file(scene, [&](const std::string& key, InputKind, const fs::path& file) {
+        const auto place = places.find(key);
+        std::error_code missing, failed;
+        if (place == places.end() || !fs::exists(place->second, missing) || fs::equivalent(place->second, file, missing))
+            return file;
+        const fs::path near = fs::proximate(place->second, failed);
+        return failed || file.is_absolute() ? place->second : near;
+    });
+}
+
+}  // namespace nephos
