@@ -83,7 +83,10 @@ class ModelFiles {
     ModelFile read(const fs::path& path, const fs::path& requested) {
         std::string text;
         try {
-            require_regular_file(path);
+            std::error_code error;
+            const fs::file_status status = fs::status(path, error);
+            if (fs::is_character_file(status) || fs::is_block_file(status))
+                require_regular_file(path);  // throws
             text = read_text_file(path, kMaxSceneBytes);
         } catch (const Error& error) {
             return {0,
