@@ -128,7 +128,12 @@ bool is_branch_point(const Checkpoint& checkpoint, const BranchPoint& point, con
 }
 
 std::string scene_text_beside(const std::filesystem::path& from) {
-    return read_scene_text_of(checkpoint_of(from).parent_path() / "manifest.json");
+    const std::filesystem::path manifest =
+        from / "manifest.json";  // of a folder, which needs no checkpoint for this
+    std::error_code error;
+    return read_scene_text_of(std::filesystem::exists(manifest, error)
+                                  ? manifest
+                                  : checkpoint_of(from).parent_path() / "manifest.json");
 }
 
 Simulation branched_simulation(const RunSettings& settings, const RunFolder& folder) {

@@ -182,8 +182,16 @@ void refuse_other_pictures(const EarlierRun& earlier, const std::vector<RunInput
 
 // The range that the same command line gives for the scene as it was.
 SimulationRange range_before(const RunSettings& settings, const Scene& before) {
-    if (settings.range.last_frame < settings.range.first_frame) return {before.steps, 1, 0};
-    return settings.range == full_range(settings.scene) ? full_range(before) : settings.range;
+    const auto full = [&](const Scene& scene) {
+        SimulationRange range = full_range(scene);
+        if (settings.branch)
+            range.first_frame = settings.range.first_frame;  // the next of the run that it branched off
+        return range;
+    };
+    if (settings.range == full(settings.scene)) return full(before);
+    SimulationRange range = settings.range;
+    if (range.last_frame < range.first_frame) range.last_step = before.steps;
+    return range;
 }
 
 }  // namespace

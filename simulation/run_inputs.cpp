@@ -60,7 +60,10 @@ std::string placed_key(const Scene& scene, const std::string& key) {
 }  // namespace
 
 fs::path path_from(const fs::path& folder, const fs::path& file) {
-    return file.is_absolute() ? file : resolved(file).lexically_relative(resolved(folder));
+    if (file.is_absolute()) return file;
+    // A file that is a link keeps its own name, which is that of the scene.
+    return (resolved(file.has_parent_path() ? file.parent_path() : ".") / file.filename())
+        .lexically_relative(resolved(folder));
 }
 
 fs::path path_of(const fs::path& folder, const fs::path& named) {
@@ -106,11 +109,11 @@ void locate_inputs(Scene& scene, const fs::path& folder, const std::vector<RunIn
     for (const RunInput& input : inputs) places[input.key] = path_of(folder, input.path);
     for_each_file(scene, [&](const std::string& key, InputKind, const fs::path& file) {
         const auto place = places.find(key);
-        std::error_code missing, failed;
+        std::error_code missing;
         if (place == places.end() || !fs::exists(place->second, missing) || fs::equivalent(place->second, file, missing))
             return file;
-        const fs::path near = fs::proximate(place->second, failed);
-        return failed || file.is_absolute() ? place->second : near;
+        const fs::path near = place->second.lexically_relative(resolved("."));
+        return near.empty() || file.is_absolute() ? place->second : near;
     });
 }
 

@@ -138,6 +138,8 @@ void check_options(const SweepOptions& options) {
         for (const std::string& key : axis.keys) {
             if (key == "seed") fail(name + ": the seed is not an axis: give the number of replicates");
             if (key == "time.steps") fail(name + ": the steps are not an axis: give the range of steps");
+            if (key == "time")
+                fail(name + ": has the steps in it, which are not an axis: name one of its keys");
             if (key == "name") fail(name + ": the name of the scene changes nothing");
         }
         if (is_sampled(options.design)) {

@@ -248,8 +248,37 @@ class Branch(Case):
         self.call("run", self.scene, "--no-render", "--out", "part", "--set", "time.steps=3")
         self.call("run", "--no-render", "--out", "part", "--set", "time.steps=6", "--resume")
         self.same_runs("whole", "part")
+        self.call("run", self.scene, "--statistics-only", "--out", "table")  # complete, without a checkpoint
+        self.assertIn("complete already", self.call("run", "--statistics-only", "--out", "table", "--resume").stderr)
         self.refused(2, "run", "--no-render", "--out", "none", "--resume", says="SCENE is missing")
         self.refused(2, "run", "--no-render", "--out", "part", says="SCENE is missing")
+
+    def test_can_be_lengthened(self):
+        """With frames of its own, and without where those of the scene were all written before it began."""
+        for name, count in (("open", ()), ("fixed", ("--set", "frames.count=2"))):
+            with self.subTest(name):
+                self.call("run", self.scene, "--no-render", "--out", name, "--set", "time.steps=4", *count)
+                branch = ("--from", name, "--no-render", "--set", "field.background.ext=0.06", *count)
+                self.call("run", *branch, "--set", "time.steps=9", "--out", f"{name} long")
+                self.call("run", *branch, "--set", "time.steps=6", "--out", f"{name} short")
+                self.call("run", "--no-render", "--set", "time.steps=9", "--out", f"{name} short", "--resume")
+                tables = [(self.folder / f"{name} {one}/statistics.csv").read_text() for one in ("long", "short")]
+                self.assertEqual(*tables)
+                self.assertIn("\n9,", tables[0])
+                if not count:
+                    self.same_runs(f"{name} long", f"{name} short")
+
+    def test_files_that_are_links_keep_their_names(self):
+        self.call("state", self.scene, "--steps", 4, "--out", "store.vdb")
+        (self.folder / "in").mkdir()
+        (self.folder / "in/state.vdb").symlink_to("../store.vdb")
+        self.write("in/files.toml", SCENE.replace("[time]", 'initial_state = "state.vdb"\n[time]'))
+        self.call("run", "in/files.toml", "--no-render", "--out", "run", "--set", "time.steps=3")
+        (self.folder / "elsewhere").mkdir()
+        subprocess.run([NEPHOS, "run", "--no-render", "--out", "../run", "--resume", "--set", "time.steps=6"],
+                       cwd=self.folder / "elsewhere", check=True, env=self.environment, stdout=subprocess.DEVNULL)
+        self.call("run", "in/files.toml", "--no-render", "--out", "whole")
+        self.assertEqual((self.folder / "run/statistics.csv").read_text(), (self.folder / "whole/statistics.csv").read_text())
 
     def test_needs_no_state_and_finds_the_files_of_the_scene(self):
         """Called in another folder than the run that it branches off, whose initial state is gone."""

@@ -275,6 +275,7 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
                         self.refused(2, "sweep", *arguments, "--out", "bad", says=says)
         ext = "field.background.ext"
         for axes, says in (([f"{ext}+{ext}=0.1,0.2"], f"key `{ext}` is in it twice"),
+                           (["time={step_s=5},{step_s=10}"], "axis time: has the steps in it"),
                            ([f"{ext}=0.1", f"{ext} =0.2"], f"key `{ext}` is in two axes"),
                            (["lattice.cells[0]=8", "lattice.cells[00]=16"], "key `lattice.cells[0]` is in two axes")):
             self.refused(2, "sweep", self.null, *(f"--axis={axis}" for axis in axes), "--out", "bad", says=says)
