@@ -183,10 +183,22 @@ std::string name_from(const std::filesystem::path& file) {
     throw SceneErrors(std::move(problems));
 }
 
+// Returns the folder of a file as texts may be put behind it, whose ".." are taken out of the text later: where that leads
+// elsewhere than the system goes, through a link, the folder without links.
+std::filesystem::path folder_of(const std::filesystem::path& file) {
+    const std::filesystem::path folder = file.parent_path();
+    if (std::ranges::find(folder, std::filesystem::path("..")) == folder.end()) return folder;
+    std::error_code error;
+    const std::filesystem::path shortened = folder.lexically_normal();
+    if (std::filesystem::equivalent(folder, shortened, error)) return folder;
+    const std::filesystem::path whole = std::filesystem::canonical(folder, error);
+    return error ? folder : whole;
+}
+
 }  // namespace
 
 Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides, SceneUse use) {
-    return read_scene_text(read_text_file(path, kMaxSceneBytes), path.string(), path.parent_path(), overrides,
+    return read_scene_text(read_text_file(path, kMaxSceneBytes), path.string(), folder_of(path), overrides,
                            use);
 }
 

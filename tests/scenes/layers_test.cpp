@@ -117,6 +117,16 @@ TEST_F(ModelFiles, AreReadOnce) {
     EXPECT_NE(messages().find("\n2 errors\n"), std::string::npos) << messages();
 }
 
+// Where the system goes by ".." behind a link is not where the text of the path leads.
+TEST_F(ModelFiles, AreFoundThroughLinks) {
+    write("genera/Cu.toml", kCu);
+    write("scene.toml", "models = [\"genera/Cu.toml\"]\n");
+    fs::create_directories(folder_ / "deep/er");
+    fs::create_directory_symlink("deep/er", folder_ / "link");
+    EXPECT_EQ(read_scene(folder_ / "link/../../scene.toml").models.size(), 1u);
+    EXPECT_EQ(read_scene(folder_ / "deep/../scene.toml").models.size(), 1u);
+}
+
 TEST_F(ModelFiles, AreNoDevices) {
     write("scene.toml", "models = [\"/dev/zero\"]\n");
     EXPECT_NE(messages().find("/dev/zero: is not a regular file"), std::string::npos) << messages();
