@@ -53,7 +53,7 @@ std::vector<std::filesystem::path> picture_files(const RunFolder& folder, const 
 struct BranchPoint {
     std::filesystem::path checkpoint;  // as the command named it
     std::filesystem::path place;       // where it is seen from here; empty: there
-    // Of that checkpoint; empty and 0 in a manifest of an earlier version. Together they decide all that is in it.
+    // Identify that checkpoint, and together all that is in it; empty and 0 in a manifest of an earlier version.
     std::string simulation_hash, state_hash;
     std::uint64_t steps = 0;
     int next_frame = 1;  // the first that the branch writes
@@ -83,7 +83,7 @@ struct RunSettings {
     SimulationResults results() const;
 };
 
-// Where a run starts.
+// Selects where a run starts.
 enum class RunStart {
     first_state,  // at step 0: a file that the scene names its state in is read
     checkpoint,   // of a run to branch off: no such file is looked at

@@ -117,7 +117,7 @@ TEST_F(ModelFiles, AreReadOnce) {
     EXPECT_NE(messages().find("\n2 errors\n"), std::string::npos) << messages();
 }
 
-// Where the system goes by ".." behind a link is not where the text of the path leads.
+// Checks that ".." behind a link leads where the system goes, not where the text of the path does.
 TEST_F(ModelFiles, AreFoundThroughLinks) {
     write("genera/Cu.toml", kCu);
     write("scene.toml", "models = [\"genera/Cu.toml\"]\n");
