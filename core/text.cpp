@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/text.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <iterator>
@@ -89,6 +90,22 @@ std::string escaped(std::string_view text, std::string_view kept) {
         }
     }
     return out;
+}
+
+std::string shell_word(const std::string& text) {
+    const bool plain = std::ranges::all_of(text, [](char c) {
+        return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+               std::string_view("._-+=:/,").find(c) != std::string_view::npos;
+    });
+    if (plain && !text.empty()) return text;
+    std::string word = "'";
+    for (const char c : text) {
+        if (c == '\'')
+            word += "'\\''";
+        else
+            word += c;
+    }
+    return word + "'";
 }
 
 }  // namespace nephos

@@ -38,4 +38,7 @@ bool is_terminal_control(char32_t code);
 // backslashes too. `kept` are control characters to leave alone.
 std::string escaped(std::string_view text, std::string_view kept = {});
 
+// Returns the text as one word of a POSIX shell: in quotes where it needs them.
+std::string shell_word(const std::string& text);
+
 }  // namespace nephos

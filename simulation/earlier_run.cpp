@@ -100,9 +100,8 @@ std::string range_text(const EarlierRun& run) {
 // Names what differs where no key does.
 std::string other_content(const EarlierRun& earlier, const RunSettings& settings) {
     const std::vector<RunInput> now = inputs_of(settings);
-    const std::string states = changed_inputs(earlier.inputs, now, {InputKind::first_state}),
-                      others =
-                          changed_inputs(earlier.inputs, now, {InputKind::simulation, InputKind::picture});
+    const std::string states = changed_inputs(earlier.inputs, now, {FileKind::first_state}),
+                      others = changed_inputs(earlier.inputs, now, {FileKind::simulation, FileKind::picture});
     if (!states.empty())
         return fmt::format("the initial state differs: {}{}{}", states, others.empty() ? "" : ", and ",
                            others);
@@ -170,7 +169,7 @@ Scene scene_before(const EarlierRun& earlier, const RunSettings& settings, const
 // Throws Error(usage) when frames that are to come would be drawn with other pictures than those that are there.
 void refuse_other_pictures(const EarlierRun& earlier, const std::vector<RunInput>& inputs,
                            const RunFolder& folder) {
-    const std::string changed = changed_inputs(earlier.inputs, inputs, {InputKind::picture});
+    const std::string changed = changed_inputs(earlier.inputs, inputs, {FileKind::picture});
     if (changed.empty()) return;
     throw Error(
         ErrorCode::usage,

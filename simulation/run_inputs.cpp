@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <map>
-#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -18,28 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kNamed = 3;
-
-// Calls use(key, kind, path) for each file that a scene names, and takes the path that it returns.
-template <class Use>
-void for_each_file(Scene& scene, const Use& use) {
-    const auto one = [&](const std::string& key, InputKind kind, std::optional<fs::path>& file) {
-        if (file) file = use(key, kind, *file);
-    };
-    const auto many = [&](const std::string& list, InputKind kind, std::vector<std::string>& files) {
-        for (std::size_t n = 0; n < files.size(); ++n) files[n] = use(indexed(list, n), kind, fs::path(files[n])).string();
-    };
-    const std::string state = "lattice.initial_state";
-    one(state, InputKind::first_state, scene.initial_state_file);
-    for (std::size_t n = 0; n < scene.layers.size(); ++n)
-        one(indexed("layer", n) + "." + state, InputKind::first_state, scene.layers[n].initial_state_file);
-    for (std::size_t n = 0; n < scene.automaton.wind.fields.size(); ++n)
-        many(indexed("wind_field", n) + ".files", InputKind::simulation, scene.automaton.wind.fields[n].files);
-    for (std::size_t n = 0; n < scene.automaton.field.grids.size(); ++n)
-        one(indexed("field.grids", n) + ".file", InputKind::simulation, scene.automaton.field.grids[n].file);
-    for (std::size_t n = 0; n < scene.models.size(); ++n)
-        many(indexed("model", n) + ".textures", InputKind::picture, scene.models[n].textures);
-    one("ground.height_map", InputKind::picture, scene.render.terrain.height_map);
-}
 
 // Returns the absolute path, with the links of what is there of it resolved where that can be.
 fs::path resolved(const fs::path& path) {
@@ -74,11 +51,13 @@ std::vector<RunInput> inputs_of(const Scene& scene, const fs::path& folder, cons
     std::vector<RunInput> inputs;
     std::map<fs::path, FileDigest> digests;
     Scene named = scene;
-    for_each_file(named, [&](const std::string& key, InputKind kind, const fs::path& file) {
-        if ((kind == InputKind::first_state && !use.first_states) || (kind == InputKind::picture && !use.pictures))
+    for_each_file(named, [&](const std::string& key, FileKind kind, const fs::path& file) {
+        if ((kind == FileKind::first_state && !use.first_states) ||
+            (kind == FileKind::picture && !use.pictures))
             return file;
         const auto [found, added] = digests.try_emplace(file);
-        if (added) found->second = read_at_key(scene, placed_key(scene, key), [&] { return file_digest(file); });
+        if (added)
+            found->second = read_at_key(scene, placed_key(scene, key), [&] { return file_digest(file); });
         inputs.push_back({key, path_from(folder, file), found->second, kind});
         return file;
     });
@@ -90,7 +69,7 @@ std::vector<RunInput> inputs_of(const RunSettings& settings) {
 }
 
 std::string changed_inputs(const std::vector<RunInput>& before, const std::vector<RunInput>& now,
-                           const std::vector<InputKind>& kinds) {
+                           const std::vector<FileKind>& kinds) {
     std::map<std::string, FileDigest> then;
     for (const RunInput& input : before) then[input.key] = input.digest;
     std::vector<std::string> names;
@@ -107,7 +86,7 @@ std::string changed_inputs(const std::vector<RunInput>& before, const std::vecto
 void locate_inputs(Scene& scene, const fs::path& folder, const std::vector<RunInput>& inputs) {
     std::map<std::string, fs::path> places;
     for (const RunInput& input : inputs) places[input.key] = path_of(folder, input.path);
-    for_each_file(scene, [&](const std::string& key, InputKind, const fs::path& file) {
+    for_each_file(scene, [&](const std::string& key, FileKind, const fs::path& file) {
         const auto place = places.find(key);
         std::error_code missing;
         if (place == places.end() || !fs::exists(place->second, missing) || fs::equivalent(place->second, file, missing))

@@ -12,22 +12,17 @@
 #include <vector>
 
 #include "core/digest.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/scene.h"
 #include "simulation/run_folder.h"
 
 namespace nephos {
 
-enum class InputKind {
-    first_state,  // at step 0: of no use to a run that goes on from a checkpoint
-    simulation,   // of every step: wind, probabilities
-    picture,      // heights of the ground, textures
-};
-
 struct RunInput {
     std::string key;             // of the scene, each file of a list with its number: "model[0].textures[1]"
     std::filesystem::path path;  // relative to the folder of the run, or absolute
     FileDigest digest;
-    InputKind kind = InputKind::picture;  // not in the manifest
+    FileKind kind = FileKind::picture;  // not in the manifest
 };
 
 // Selects the files that count for a run.
@@ -44,7 +39,7 @@ std::vector<RunInput> inputs_of(const RunSettings& settings);
 // Returns a text that names the files of a scene whose content is not as it was, at most three; empty where there is none,
 // or nothing is known of them. Only of `kinds`.
 std::string changed_inputs(const std::vector<RunInput>& before, const std::vector<RunInput>& now,
-                           const std::vector<InputKind>& kinds);
+                           const std::vector<FileKind>& kinds);
 
 // Sets the names of a scene's files, which its run found from the folder where the command was called, to where they are
 // seen from here. Leaves those that are not there.

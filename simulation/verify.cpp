@@ -384,7 +384,7 @@ Simulation run_anew(const RunListing& run, const Scene& scene, const SimulationR
         const std::vector<RunInput> now =
             inputs_of(scene, run.folder, {.first_states = true, .pictures = false});
         const std::string changed =
-            changed_inputs(run.inputs, now, {InputKind::first_state, InputKind::simulation});
+            changed_inputs(run.inputs, now, {FileKind::first_state, FileKind::simulation});
         if (!changed.empty()) throw Error(ErrorCode::io, "the content is not as it was: " + changed);
         if (run.inputs.empty() && !now.empty())
             throw Error(ErrorCode::io,

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/placed_scene.h"
 
-#include <optional>
 #include <string>
 #include <system_error>
+
+#include "scenes/format/named_files.h"
 
 namespace nephos {
 namespace {
@@ -28,21 +29,10 @@ Scene placed_scene(Scene scene, const fs::path& folder) {
     const fs::path from = normal(folder);
     std::error_code error;
     const bool has_links = fs::weakly_canonical(from, error) != from;
-    const auto placed = [&](const fs::path& file) {
+    for_each_file(scene, [&](const std::string&, FileKind, const fs::path& file) {
         const fs::path whole = normal(file);
         return has_links || !begin_alike(whole, from) ? whole : whole.lexically_relative(from);
-    };
-    const auto place = [&](std::optional<fs::path>& file) {
-        if (file) file = placed(*file);
-    };
-    place(scene.initial_state_file);
-    place(scene.render.terrain.height_map);
-    for (LayerOptions& layer : scene.layers) place(layer.initial_state_file);
-    for (ProbabilityGrid& grid : scene.automaton.field.grids) place(grid.file);
-    for (WindField& field : scene.automaton.wind.fields)
-        for (std::string& file : field.files) file = placed(file).generic_string();
-    for (BaseModel& model : scene.models)
-        for (std::string& file : model.textures) file = placed(file).generic_string();
+    });
     return scene;
 }
 

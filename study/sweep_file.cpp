@@ -23,8 +23,9 @@ constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr std::uint64_t kMostValues = 100'000;
 const std::vector<std::string_view> kScaleNames{"linear", "log", "integer"};
 
-void read_axis(TomlTable& table, SweepOptions& options) {
+void read_axis(TomlTable& table, const std::filesystem::path& folder, SweepOptions& options) {
     Axis& axis = options.axes.emplace_back();
+    axis.folder = folder;
     if (const auto key = table.text("key")) axis.keys = {*key};
     for (std::string& key : table.texts("keys")) axis.keys.push_back(std::move(key));
     if (axis.keys.empty())
@@ -204,7 +205,7 @@ SweepOptions read_sweep_file(const std::filesystem::path& path) {
         options.tracks = table.flag("tracks").value_or(false);
         options.layer = table.text("layer").value_or("");
         table.table("steps", [&](TomlTable& steps) { read_steps(steps, options.steps); });
-        table.tables("axis", [&](TomlTable& axis) { read_axis(axis, options); });
+        table.tables("axis", [&](TomlTable& axis) { read_axis(axis, path.parent_path(), options); });
     });
     return options;
 }

@@ -18,6 +18,7 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "core/wind_field.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
 #include "scenes/format/writer.h"
@@ -63,21 +64,9 @@ std::string canonical_value(const std::string& value) {
 
 bool is_compound(const std::string& value) { return value.starts_with('[') || value.starts_with('{'); }
 
-// Returns the text as one word of a POSIX shell: values of keys may have spaces, quotes and brackets.
-std::string shell_word(const std::string& text) {
-    const bool plain = std::ranges::all_of(text, [](char c) {
-        return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-               std::string_view("._-+=:/,").find(c) != std::string_view::npos;
-    });
-    if (plain) return text;
-    std::string word = "'";
-    for (const char c : text) {
-        if (c == '\'')
-            word += "'\\''";
-        else
-            word += c;
-    }
-    return word + "'";
+// Returns whether a key is another one or in it: "a.b[0]" in "a.b" and "a".
+bool is_within(std::string_view key, std::string_view outer) {
+    return key == outer || (key.starts_with(outer) && (key[outer.size()] == '.' || key[outer.size()] == '['));
 }
 
 std::uint64_t point_count(const SweepOptions& options) {
@@ -141,6 +130,10 @@ void check_options(const SweepOptions& options) {
             if (key == "time")
                 fail(name + ": has the steps in it, which are not an axis: name one of its keys");
             if (key == "name") fail(name + ": the name of the scene changes nothing");
+            if (key == "models")
+                fail(name +
+                     ": files with base models are not an axis: name all of them in the scene, and vary the "
+                     "`models` of a sky");
         }
         if (is_sampled(options.design)) {
             if (!axis.values.empty())
@@ -245,9 +238,41 @@ std::string SweepPlan::scene_text_in(const std::filesystem::path& folder) const 
     return nephos::to_toml(placed_scene(scene_, folder));
 }
 
-std::vector<std::vector<std::string>> SweepPlan::check_axes() const {
+Scene SweepPlan::check_value(std::size_t axis_number, std::size_t n, const std::string& value) {
+    Axis& axis = options_.axes[axis_number];
+    std::vector<std::string> overrides = options_.overrides;
+    for (const std::string& key : axis.keys) overrides.push_back(key + "=" + value);
+    Scene scene = read_scene(options_.scene_file, overrides, SceneUse::without_frames);
+    bool has_files = false;
+    std::string placed = value;
+    for_each_file(scene, [&](const std::string& key, FileKind, const std::filesystem::path& file) {
+        if (std::ranges::none_of(axis.keys, [&](const std::string& of) { return is_within(key, of); }))
+            return file;
+        has_files = true;
+        if (file.is_absolute()) return file;
+        // The runs find a file from any folder: that of the call, of the sweep, of another machine's task.
+        if (is_compound(value))
+            throw Error(
+                ErrorCode::usage,
+                fmt::format(
+                    "axis {}: value {}, {}, names the file {}: expected an absolute path, as runs of the "
+                    "sweep are repeated in other folders",
+                    joined_keys(axis), n + 1, value, file.string()));
+        std::filesystem::path whole = std::filesystem::absolute(axis.folder / file).lexically_normal();
+        placed = toml_string(whole.string());
+        return whole;
+    });
+    if (!has_files) return scene;
+    axis.values[n] = placed;
+    contents_[axis_number][placed] = simulation_start(scene).simulation_hash;
+    return scene;
+}
+
+std::vector<std::vector<std::string>> SweepPlan::check_axes() {
     std::vector<std::vector<std::string>> equals;
-    for (const Axis& axis : options_.axes) {
+    contents_.resize(options_.axes.size());
+    for (std::size_t a = 0; a < options_.axes.size(); ++a) {
+        const Axis& axis = options_.axes[a];
         std::vector<std::string> values = axis.values;
         if (values.empty()) values = {value_at(axis, 0), value_at(axis, 1)};
         // Numbers and words have one text each; arrays and tables may say the same in several.
@@ -256,9 +281,8 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() const {
         std::map<std::pair<std::uint64_t, std::uint64_t>, std::size_t> scenes;
         std::vector<std::string>& firsts = equals.emplace_back(values);
         for (std::size_t n = 0; n < values.size(); ++n) {
-            std::vector<std::string> overrides = options_.overrides;
-            for (const std::string& key : axis.keys) overrides.push_back(key + "=" + values[n]);
-            const Scene scene = read_scene(options_.scene_file, overrides, SceneUse::without_frames);
+            const Scene scene = check_value(a, n, values[n]);
+            if (!axis.values.empty()) firsts[n] = values[n] = axis.values[n];
             if (!may_equal) continue;
             const StateHash hash = hash_of_text(nephos::to_toml(scene));
             const std::size_t first = scenes.emplace(std::pair(hash.high, hash.low), n).first->second;
@@ -271,6 +295,9 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() const {
                                 "value once",
                                 joined_keys(axis), n + 1, values[n], first + 1, values[first]));
         }
+        // Two names may be of one file.
+        if (options_.design == Design::grid && !contents_[a].empty())
+            require_different(axis, "axis " + joined_keys(axis));
     }
     // Values that are good alone may contradict each other.
     if (points_ > 0) scene_of(run(0));
@@ -329,8 +356,12 @@ std::vector<std::string> SweepPlan::values_of_point(std::uint64_t point) const {
 // The keys and values of a point in the order of the keys, whatever the order of the axes.
 std::string SweepPlan::identity(const std::vector<std::string>& values) const {
     std::vector<std::string> lines;
-    for (std::size_t n = 0; n < values.size(); ++n)
-        for (const std::string& key : options_.axes[n].keys) lines.push_back(key + "=" + values[n] + "\n");
+    for (std::size_t n = 0; n < values.size(); ++n) {
+        const auto content = contents_[n].find(values[n]);
+        const std::string of_files = content == contents_[n].end() ? "" : " " + content->second;
+        for (const std::string& key : options_.axes[n].keys)
+            lines.push_back(key + "=" + values[n] + of_files + "\n");
+    }
     std::ranges::sort(lines);
     return fmt::format("{}", fmt::join(lines, ""));
 }

@@ -5,14 +5,15 @@
 // n, so that a million of them take no memory.
 //
 //     run n = replicate n % replicates of point n / replicates
-//     id    = XXH3-128 of the scene, the point's keys and values, the seed, the rules of steps and the version of the
-//             statistics: never of n, of the order, of a shard or of a worker
+//     id    = XXH3-128 of the scene, the point's keys and values, what is in the files that a value names, the seed, the
+//             rules of steps and the version of the statistics: never of n, of the order, of a shard or of a worker
 //     seed  = Philox(seed of the sweep; domain sweep, replicate, hash of the point's keys and values), so a replicate of a
 //             point has the same seed when an axis grows; with common seeds without the hash: replicate r has one seed
 //             at all points
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -31,6 +32,7 @@ enum class Scale { linear, log, integer };
 struct Axis {
     std::vector<std::string> keys;    // "field.background.ext"; at least one
     std::vector<std::string> values;  // as TOML; of a grid and a list
+    std::filesystem::path folder;     // of relative names of files among the values; empty: the current one
     // Of the other designs.
     double from = 0, to = 1;
     Scale scale = Scale::linear;
@@ -78,8 +80,9 @@ struct PlannedRun {
 
 class SweepPlan {
   public:
-    // Reads the scene and checks every value of every axis (of a range its ends) against it, before anything is run.
-    // Throws SceneErrors that point at the value, Error(usage) on axes that contradict each other or overlap, Error(io).
+    // Reads the scene and checks every value of every axis (of a range its ends) against it, before anything is run. A value
+    // that is the name of a file becomes absolute. Throws SceneErrors that point at the value, Error(usage) on axes that
+    // contradict each other or overlap, Error(io).
     explicit SweepPlan(SweepOptions options);
 
     const SweepOptions& options() const { return options_; }
@@ -103,7 +106,9 @@ class SweepPlan {
 
   private:
     // Returns for each value of each axis the first one of the axis that is the same.
-    std::vector<std::vector<std::string>> check_axes() const;
+    std::vector<std::vector<std::string>> check_axes();
+    // Reads the scene with value `n` of an axis, and settles which files that value names.
+    Scene check_value(std::size_t axis, std::size_t n, const std::string& value);
     // `equals`: as check_axes() returns it.
     void require_different_points(const std::vector<std::vector<std::string>>& equals) const;
     std::string identity(const std::vector<std::string>& values) const;
@@ -111,6 +116,8 @@ class SweepPlan {
     SweepOptions options_;
     Scene scene_;
     std::string simulation_hash_;
+    std::vector<std::map<std::string, std::string>>
+        contents_;  // of each axis: by value, of the files that it names
     std::uint64_t points_ = 0;
     std::vector<double> unit_points_;  // of sampled designs
 };

@@ -26,14 +26,6 @@ const Node* date_in(const Node& node) {
     return nullptr;
 }
 
-std::string key_text(const std::string& name) {
-    const bool bare = !name.empty() && std::ranges::all_of(name, [](char c) {
-        return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' ||
-               c == '-';
-    });
-    return bare ? name : toml_string(name);
-}
-
 std::string value_text(const Node& node);
 
 // Returns a table between braces, its keys sorted.
@@ -43,7 +35,7 @@ std::string table_text(const Node& node) {
     std::ranges::sort(sorted, {}, [](const Entry* entry) { return std::string_view(entry->name); });
     std::vector<std::string> items;
     for (const Entry* entry : sorted)
-        items.push_back(key_text(entry->name) + " = " + value_text(entry->value));
+        items.push_back(toml_key(entry->name) + " = " + value_text(entry->value));
     return "{" + joined(items, ", ") + "}";
 }
 

@@ -6,6 +6,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/text.h"
 
 namespace nephos {
 namespace {
@@ -58,7 +59,7 @@ Engine parse_engine(const std::string& text) {
 std::string emit_sweep(const SweepPlan& plan, Engine engine, std::uint32_t shards,
                        const std::filesystem::path& folder) {
     write_plan(plan, folder);
-    const std::string go = fmt::format("cd {}\n", folder.string());
+    const std::string go = fmt::format("cd {}\n", shell_word(folder.string()));
     switch (engine) {
         case Engine::slurm:
             write_atomically(folder / "sweep.slurm", fmt::format(kSlurm, shards, shards - 1));

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/python/released_lock.h"
 #include "core/error.h"
 #include "core/text.h"
 
@@ -75,7 +76,7 @@ py::array cells_array(const LayerPlanes& layer, Plane plane) {
     const Extent e = bits.extent;
     auto cells = std::make_shared<std::vector<std::uint8_t>>();
     {
-        const py::gil_scoped_release released;
+        const ReleasedLock released;
         cells->resize(e.cells());
         std::uint8_t* to = cells->data();
         for (int k = 0; k < e.z; ++k) {
@@ -99,7 +100,7 @@ py::array words_array(const LayerPlanes& layer, Plane plane) {
 py::array voxels_array(const DensityGrid& grid) {
     std::vector<float> voxels;
     {
-        const py::gil_scoped_release released;
+        const ReleasedLock released;
         voxels = grid.to_dense();
     }
     return vector_array(std::move(voxels), shape_of(grid.extent()));

@@ -19,6 +19,7 @@
 
 #include "apps/python/arrays.h"
 #include "apps/python/live_simulation.h"
+#include "apps/python/released_lock.h"
 #include "apps/python/scene_text.h"
 #include "core/error.h"
 
@@ -82,7 +83,7 @@ void add_scene(py::module_& module) {
         "A scene, which never changes: set() returns another one. Every key, its unit, range and "
         "default stand in docs/scene-reference.md.")
         .def(py::init([](const std::filesystem::path& path) {
-                 const py::gil_scoped_release released;
+                 const ReleasedLock released;
                  return SceneText::from_file(path);
              }),
              "path"_a,
@@ -90,7 +91,7 @@ void add_scene(py::module_& module) {
         .def_static(
             "from_text",
             [](const std::string& text, const std::filesystem::path& folder) {
-                const py::gil_scoped_release released;
+                const ReleasedLock released;
                 return SceneText::from_text(text, folder);
             },
             "text"_a, "folder"_a = std::filesystem::path(),
@@ -99,7 +100,7 @@ void add_scene(py::module_& module) {
             "set",
             [](const SceneText& scene, const std::string& key, const py::object& value) {
                 const std::string setting = key + "=" + toml_text(value);
-                const py::gil_scoped_release released;
+                const ReleasedLock released;
                 return scene.with(setting);
             },
             "key"_a, "value"_a,
@@ -166,7 +167,7 @@ LiveSimulation& take_steps(LiveSimulation& simulation, const py::object& n) {
     std::uint64_t count = whole_number(n, "n", "a whole number of steps, 0 or more");
     while (count > 0) {
         {
-            const py::gil_scoped_release released;
+            const ReleasedLock released;
             count -= simulation.step(count, kSignalInterval_s);
         }
         if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -179,7 +180,7 @@ py::dict statistics_of(LiveSimulation& simulation, const std::optional<LayerKey>
     if (layer) number = simulation.layer_number(*layer);
     StepResult result;
     {
-        const py::gil_scoped_release released;
+        const ReleasedLock released;
         result = simulation.statistics(density);
     }
     return statistics_dict(result, number);
@@ -196,7 +197,7 @@ py::dict clouds_of(LiveSimulation& simulation, const LayerKey& layer, int dimens
     LayerPlanes planes;
     std::vector<ConnectedCloud> clouds;
     {
-        const py::gil_scoped_release released;
+        const ReleasedLock released;
         planes = simulation.planes(layer);
         const BitPlaneView cld = planes.planes->cld.view();
         clouds = dimensions == 3
@@ -212,7 +213,7 @@ py::dict organisation_of(LiveSimulation& simulation, const LayerKey& layer, int 
     Organisation found;
     NullOrganisation random;
     {
-        const py::gil_scoped_release released;
+        const ReleasedLock released;
         const LayerPlanes planes = simulation.planes(layer);
         const BitPlaneView cld = planes.planes->cld.view();
         const double cover =
@@ -240,7 +241,7 @@ Plane plane_named(const std::string& name) {
 }
 
 LayerPlanes planes_of(LiveSimulation& simulation, const LayerKey& layer) {
-    const py::gil_scoped_release released;
+    const ReleasedLock released;
     return simulation.planes(layer);
 }
 
@@ -263,7 +264,7 @@ void add_simulation(py::module_& module) {
                  Scene changed = scene.scene();
                  if (!seed.is_none())
                      changed.automaton.seed = whole_number(seed, "seed", "a whole number from 0 to 2^64 - 1");
-                 const py::gil_scoped_release released;
+                 const ReleasedLock released;
                  return std::make_unique<LiveSimulation>(std::move(changed));
              }),
              "scene"_a, "seed"_a = py::none(),
@@ -275,13 +276,13 @@ void add_simulation(py::module_& module) {
              "where n "
              "is no\n"
              "whole number of 0 or more.")
-        .def_property_readonly("step_number", &LiveSimulation::step_number,
-                               py::call_guard<py::gil_scoped_release>(), "Steps taken.")
-        .def_property_readonly("time_s", &LiveSimulation::time_s, py::call_guard<py::gil_scoped_release>(),
+        .def_property_readonly("step_number", &LiveSimulation::step_number, py::call_guard<ReleasedLock>(),
+                               "Steps taken.")
+        .def_property_readonly("time_s", &LiveSimulation::time_s, py::call_guard<ReleasedLock>(),
                                "Simulated time, seconds.")
         .def_property_readonly("layers", &LiveSimulation::layers,
                                "Names of the layers; [''] of a scene without layers.")
-        .def("hash", &LiveSimulation::hash, py::call_guard<py::gil_scoped_release>(),
+        .def("hash", &LiveSimulation::hash, py::call_guard<ReleasedLock>(),
              "Returns the hash of the state, 32 hexadecimal digits: that of `nephos hash` and of "
              "statistics.csv.")
         .def("hum", &cells_of<&Lattice::hum>, "layer"_a = 0, "Vapour enough to form cloud" NEPHOS_CELLS)
@@ -327,8 +328,7 @@ void add_simulation(py::module_& module) {
              "these, as clouds have a size. Definitions and sources: docs/research.md. Takes n^2 operations "
              "for "
              "n clouds.")
-        .def("density", &LiveSimulation::density, "layer"_a = py::none(),
-             py::call_guard<py::gil_scoped_release>(),
+        .def("density", &LiveSimulation::density, "layer"_a = py::none(), py::call_guard<ReleasedLock>(),
              "Returns the Density of a layer, or of all together: cld smoothed in space and time, as in "
              "density files\n"
              "without density.refine. Raises Error where clouds are drawn without one.")
@@ -337,7 +337,7 @@ void add_simulation(py::module_& module) {
             [](LiveSimulation& simulation) {
                 Rgb8Image image;
                 {
-                    const py::gil_scoped_release released;
+                    const ReleasedLock released;
                     image = simulation.picture();
                 }
                 return pixels_array(std::move(image));
@@ -347,7 +347,7 @@ void add_simulation(py::module_& module) {
             "at the top, sRGB; read-only. camera.width and camera.height are its size, frames.splatting says "
             "what draws.")
         .def("__repr__", [](const LiveSimulation& simulation) {
-            const py::gil_scoped_release released;
+            const ReleasedLock released;
             return fmt::format("<nephos.Simulation at step {}>", simulation.step_number());
         });
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "scenes/format/document.h"
 #include "scenes/format/text.h"
 
 namespace nephos {

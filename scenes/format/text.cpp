@@ -76,6 +76,12 @@ std::string toml_string(std::string_view text) {
     return out + '"';
 }
 
+std::string toml_key(std::string_view name) {
+    constexpr std::string_view kBare = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
+    const bool bare = !name.empty() && name.find_first_not_of(kBare) == name.npos;
+    return bare ? std::string(name) : toml_string(name);
+}
+
 std::string enclosed(std::string_view text, char mark) {
     std::string out(1, mark);
     out += text;

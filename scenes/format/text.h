@@ -32,6 +32,9 @@ std::string toml_number(double value);
 // Returns a TOML basic string with its quotes.
 std::string toml_string(std::string_view text);
 
+// Returns a name as a key of TOML: as it is where it may be bare, as toml_string() otherwise.
+std::string toml_key(std::string_view name);
+
 // Returns the text between two marks: enclosed("cells", '`') is "`cells`".
 std::string enclosed(std::string_view text, char mark);
 

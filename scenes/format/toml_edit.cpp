@@ -44,17 +44,11 @@ std::string line_break_before(std::string_view text, std::size_t at) {
     return at_line_start ? "" : newline_of(text);
 }
 
-bool is_bare(std::string_view name) {
-    return !name.empty() && name.find_first_not_of(
-                                "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == kNone;
-}
-std::string key_text(std::string_view name) { return is_bare(name) ? std::string(name) : toml_string(name); }
-
 std::string dotted(const TextPath& path, std::size_t from) {
     std::string out;
     for (std::size_t n = from; n < path.size(); ++n) {
         if (!out.empty()) out += '.';
-        out += key_text(path[n].name);
+        out += toml_key(path[n].name);
     }
     return out;
 }
@@ -140,7 +134,7 @@ Change new_section(std::string_view text, std::size_t at, const std::string& hea
 
 std::string as_lines(std::span<const TextEntry> entries, const std::string& newline) {
     std::string out;
-    for (const auto& [name, value] : entries) out += key_text(name) + " = " + value + newline;
+    for (const auto& [name, value] : entries) out += toml_key(name) + " = " + value + newline;
     return out;
 }
 
@@ -148,7 +142,7 @@ std::string as_braces(std::span<const TextEntry> entries) {
     std::string out = "{ ";
     for (const auto& [name, value] : entries) {
         if (out.size() > 2) out += ", ";
-        out += key_text(name) + " = " + value;
+        out += toml_key(name) + " = " + value;
     }
     return out += entries.empty() ? "}" : " }";
 }
@@ -186,7 +180,7 @@ Change missing_key(std::string_view text, const TomlNode& root, const TextPath& 
     const std::string newline = newline_of(text);
     if (&table == &root && path.size() - reached.steps > 1) {
         TextPath header(path.begin(), path.end() - 1);
-        const std::string body = key_text(path.back().name) + " = " + std::string(value) + newline;
+        const std::string body = toml_key(path.back().name) + " = " + std::string(value) + newline;
         return new_section(text, text.size(), "[" + dotted(header, 0) + "]", body);
     }
     if (table.form == Form::section && table.headers.empty()) {  // it has only sub-tables

@@ -59,5 +59,13 @@ TEST(Escaped, LeavesNoControl) {
     }
 }
 
+TEST(ShellWord, IsReadByAShellAsTheText) {
+    EXPECT_EQ(shell_word("a.b[0]=1"), "'a.b[0]=1'");
+    EXPECT_EQ(shell_word("out/run-1"), "out/run-1");
+    EXPECT_EQ(shell_word("my clouds"), "'my clouds'");
+    EXPECT_EQ(shell_word("it's $HOME"), "'it'\\''s $HOME'");
+    EXPECT_EQ(shell_word(""), "''");
+}
+
 }  // namespace
 }  // namespace nephos

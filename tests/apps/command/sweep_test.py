@@ -359,6 +359,53 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
         self.assertIn('"before": 2', self.call("sweep", "moved/a.toml", *sweep, "--out", "moved/o", "--json").stdout)
         self.assertEqual((self.folder / "moved/o/scene.toml").read_text(), text)
 
+    def test_files_as_values_of_an_axis(self):
+        states = {}
+        for name, seed in (("a.vdb", 1), ("b.vdb", 2)):
+            self.call("run", self.null, "--no-render", "--set", "density.write_state=true", "--set", "frames.count=12", "--set",
+                      "time.steps=4", "--set", "field.background.hum=0.3", "--seed", str(seed), "--out", "w", "--overwrite")
+            states[name] = max((self.folder / "w/density").glob("*.vdb")).read_bytes()
+        self.assertNotEqual(states["a.vdb"], states["b.vdb"])
+        data, out = self.folder / "data", "data/o"
+        data.mkdir()
+        for name, state in states.items():
+            (data / name).write_bytes(state)
+        scene = self.write("data/s.toml", NULL.replace('initial = "empty"', 'initial_state = "a.vdb"'))
+        rest = ("--replicates", "1", "--steps", "20", "--out")
+        axis = "lattice.initial_state=data/a.vdb,data/b.vdb"
+        self.call("sweep", scene, "--axis", axis, *rest, out)
+        before = self.tables(out)
+        runs = rows(self.folder / out / "runs.csv")
+        self.assertNotEqual(runs[0]["state_hash"], runs[1]["state_hash"])
+        self.assertEqual(runs[1]["lattice.initial_state"].strip('"'), str(data.resolve() / "b.vdb"))
+        # The sweep's own file, from its folder and from here; the same sweep by other names of the files.
+        home = self.folder
+        for folder, call in ((data / "o", ("sweep", "sweep.toml", "--out", ".")), (home, ("sweep", f"{out}/sweep.toml", "--out", out)),
+                             (data, ("sweep", scene, "--axis", "lattice.initial_state='a.vdb','./b.vdb'", *rest, "o"))):
+            self.folder = folder
+            self.assertIn('"before": 2', self.call(*call, "--json").stdout)
+            self.folder = home
+            self.assertEqual(self.tables(out), before)
+        # Names in a sweep file are relative to it.
+        plan = self.write("data/plan.toml", 'scene = "s.toml"\nreplicates = 1\n[steps]\nmin = 20\nmax = 20\n[[axis]]\n'
+                          'key = "lattice.initial_state"\nvalues = ["a.vdb", "b.vdb"]\n')
+        self.assertIn('"before": 2', self.call("sweep", plan, "--out", out, "--json").stdout)
+        # Another content under the same name is another run.
+        (data / "b.vdb").write_bytes(states["a.vdb"])
+        self.assertIn('"before": 1', self.call("sweep", scene, "--axis", axis, *rest, out, "--json").stdout)
+        again = rows(self.folder / out / "runs.csv")
+        self.assertEqual(again[0]["run"], runs[0]["run"])
+        self.assertNotEqual(again[1]["run"], runs[1]["run"])
+        self.assertNotEqual(again[1]["state_hash"], runs[1]["state_hash"])
+        for status, key, says in ((2, "lattice.initial_state=data/a.vdb,data/./a.vdb", "expected each value once"),
+                                  (2, "lattice={cells=[8,8,8],initial_state='data/a.vdb'}", "expected an absolute path"),
+                                  (2, "models=['m.toml']", "are not an axis")):
+            with self.subTest(axis=key):
+                self.refused(status, "sweep", scene, "--axis", key, *rest, "no", says=says)
+        missing = self.call("sweep", scene, "--axis", "lattice.initial_state=data/a.vdb,data/c.vdb", *rest, "no", status=3)
+        self.assertIn(f"{data.resolve()}/c.vdb: No such file", missing.stderr)
+        self.assertFalse((self.folder / "no").exists())
+
     def test_a_grown_axis_computes_only_what_is_new(self):
         self.sweep("grown", "-j", "2", axis="field.background.ext=0.2,0.05")
         result = self.sweep("grown", "-j", "2", "--json")

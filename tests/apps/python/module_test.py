@@ -445,6 +445,23 @@ class Threads(Case):
         self.assertTrue(0 < steps < 10**9)
         self.assertEqual(simulation.step().step_number, steps + 1)
 
+    def test_a_program_ends_while_its_daemons_work(self):
+        # Python takes the interpreter from them where they come back from the engine.
+        program = ("import nephos, threading, time\n"
+                   f"simulations = [nephos.Simulation(nephos.Scene({str(self.scene)!r})) for _ in range(2)]\n"
+                   "def work(simulation):\n"
+                   "    while True:\n"
+                   "        simulation.step()\n"
+                   "        simulation.hash()\n"
+                   "        simulation.density()\n"
+                   "for simulation in simulations:\n"
+                   "    threading.Thread(target=work, args=[simulation], daemon=True).start()\n"
+                   "threading.Thread(target=simulations[0].step, args=[10**8], daemon=True).start()\n"
+                   "time.sleep(0.2)\n")
+        for _ in range(10):
+            result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+
 
 class Documentation(Case):
     def test_the_example_of_the_page_runs(self):
