@@ -40,6 +40,8 @@ bool is_trusted_link(const std::filesystem::path& link) {
     return ::lstat(link.c_str(), &status) == 0 && (status.st_uid == ::geteuid() || status.st_uid == 0);
 }
 
+constexpr int kMostLinks = 40;  // as Linux
+
 // Resolves symbolic links, so that the file that one points to is replaced and not the link. Refuses devices
 // and pipes, which a rename would replace by a plain file.
 std::filesystem::path target_of(const std::filesystem::path& path) {
@@ -50,15 +52,22 @@ std::filesystem::path target_of(const std::filesystem::path& path) {
         kind != std::filesystem::file_type::none) {
         throw Error(ErrorCode::io, path.string() + ": is not a regular file");
     }
-    if (!std::filesystem::is_symlink(path, error)) return path;
-    if (!is_trusted_link(path))
-        throw Error(ErrorCode::io, path.string() + ": is a link of another user, which is not followed");
-    const std::filesystem::path target = std::filesystem::weakly_canonical(path, error);
-    if (error) fail(path, "cannot follow the link", error.value());
+    std::filesystem::path target = path;
+    for (int links = 0; std::filesystem::is_symlink(target, error); ++links) {
+        if (links == kMostLinks) fail(path, "cannot follow the link", ELOOP);
+        if (!is_trusted_link(target)) {
+            const std::string link = links == 0 ? "" : "leads to " + target.string() + ", which ";
+            throw Error(ErrorCode::io, path.string() + ": " + link + "is a link of another user, which is not followed");
+        }
+        const std::filesystem::path next = std::filesystem::read_symlink(target, error);
+        if (error) fail(path, "cannot follow the link", error.value());
+        target = target.parent_path() / next;  // `next` alone where it is absolute
+    }
     return target;
 }
 
 constexpr std::string_view kPart = ".part";
+constexpr mode_t kPermissions = 0777;  // no set-user-ID and the like
 
 // ".STEM.partNUMBERS.EXTENSION"; the extension last, because some writers choose the format by it.
 std::string temporary_name(const std::filesystem::path& path, const std::string& numbers) {
@@ -98,25 +107,40 @@ class PieceWriter {
 
 }  // namespace
 
-AtomicFile::AtomicFile(const std::filesystem::path& given) : path_(target_of(given)) {
+AtomicFile::AtomicFile(const std::filesystem::path& given, Access access) : path_(target_of(given)) {
     std::error_code error;
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
     std::filesystem::create_directories(folder, error);
     if (error) fail(folder, "cannot create the folder", error.value());
-    create_temporary(folder);
+    create_temporary(folder, access);
+    take_permissions();
+}
+
+// Before there is content that others might read. Where the system refuses, the new file is as any other.
+void AtomicFile::take_permissions() {
+    struct stat before {};
+    if (::stat(path_.c_str(), &before) != 0) return;
+    const Descriptor descriptor(::open(temporary_.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
+    if (descriptor.get() < 0) return;
+    if (::geteuid() == 0) {
+        [[maybe_unused]] const int ignored = ::fchown(descriptor.get(), before.st_uid, before.st_gid);
+    }
+    permissions_ = before.st_mode & kPermissions;
+    [[maybe_unused]] const int ignored = ::fchmod(descriptor.get(), *permissions_ | S_IRUSR | S_IWUSR);
 }
 
 // A name of this process' number and 64 random bits, and O_EXCL: in a folder that others may write to, a file or link
 // that waits under that name is never opened.
-void AtomicFile::create_temporary(const std::filesystem::path& folder) {
+void AtomicFile::create_temporary(const std::filesystem::path& folder, Access access) {
     constexpr int kAttempts = 100;
+    const mode_t mode = access == Access::owner ? 0600 : 0666;
     std::random_device random;
     for (int attempt = 1;; ++attempt) {
         const std::uint64_t number = std::uint64_t{random()} << 32 | random();
         temporary_ =
             folder / temporary_name(path_, std::to_string(::getpid()) + "-" + std::to_string(number));
         const Descriptor descriptor(
-            ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+            ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
         if (descriptor.get() < 0 && errno == EEXIST && attempt < kAttempts) continue;
         struct stat status {};
         if (descriptor.get() < 0) fail(path_, "cannot create", errno);
@@ -149,6 +173,12 @@ void AtomicFile::publish() {
         throw Error(ErrorCode::io,
                     path_.string() + ": another file was put in the place of its temporary one");
     flush_to_device(temporary_, path_, O_RDONLY | O_NOFOLLOW);
+    if (permissions_ && *permissions_ != (status.st_mode & kPermissions)) {
+        const Descriptor descriptor(::open(temporary_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+        if (::fstat(descriptor.get(), &status) == 0 && is_created_file(status)) {
+            [[maybe_unused]] const int ignored = ::fchmod(descriptor.get(), *permissions_);
+        }
+    }
     std::error_code error;
     std::filesystem::rename(temporary_, path_, error);
     if (error) fail(path_, "cannot rename into place", error.value());
@@ -164,22 +194,22 @@ void write_atomically(const std::filesystem::path& path,
 }
 
 void write_pieces_atomically(const std::filesystem::path& path,
-                             const std::function<void(const AppendPiece& append)>& fill) {
-    write_atomically(path, [&](const std::filesystem::path& temporary) {
-        Descriptor descriptor(::open(temporary.c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC));
-        if (descriptor.get() < 0) fail(path, "cannot open", errno);
-        PieceWriter writer(descriptor.get());
-        const auto check = [&](int error) {
-            if (error != 0) fail(path, "cannot write", error);
-        };
-        fill([&](std::string_view piece) { check(writer.append(piece)); });
-        check(writer.flush());
-        if (descriptor.close() != 0) fail(path, "cannot write", errno);
-    });
+                             const std::function<void(const AppendPiece& append)>& fill, Access access) {
+    AtomicFile file(path, access);
+    Descriptor descriptor(::open(file.temporary().c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC));
+    if (descriptor.get() < 0) fail(path, "cannot open", errno);
+    PieceWriter writer(descriptor.get());
+    const auto check = [&](int error) {
+        if (error != 0) fail(path, "cannot write", error);
+    };
+    fill([&](std::string_view piece) { check(writer.append(piece)); });
+    check(writer.flush());
+    if (descriptor.close() != 0) fail(path, "cannot write", errno);
+    file.publish();
 }
 
-void write_atomically(const std::filesystem::path& path, std::string_view content) {
-    write_pieces_atomically(path, [&](const AppendPiece& append) { append(content); });
+void write_atomically(const std::filesystem::path& path, std::string_view content, Access access) {
+    write_pieces_atomically(path, [&](const AppendPiece& append) { append(content); }, access);
 }
 
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> content) {

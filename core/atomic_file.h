@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,14 +17,20 @@
 
 namespace nephos {
 
+// Who may read a file that was not there before; one that is replaced keeps its permissions, and for root its owner.
+enum class Access {
+    shared,  // as the umask has it
+    owner,   // this user alone
+};
+
 // A file that is written under a temporary name until it is complete. write_atomically() and the functions below it use
 // one.
 class AtomicFile {
   public:
-    // Creates an empty temporary file whose name nobody can foresee beside `path`, and missing parent folders. A
-    // symbolic link of this user or of root keeps pointing to the new file; one of another user, a device, a pipe or a
-    // folder in the place of the file is refused. Throws Error(io) naming `path`.
-    explicit AtomicFile(const std::filesystem::path& path);
+    // Creates an empty temporary file whose name nobody can foresee beside `path`, and missing parent folders. Symbolic
+    // links of this user or of root keep pointing to the new file, also where it is not there yet; one of another user, a
+    // device, a pipe or a folder in the place of the file is refused. Throws Error(io) naming `path`.
+    explicit AtomicFile(const std::filesystem::path& path, Access access = Access::shared);
     // Removes the temporary file unless it was published, unless another was put in its place.
     ~AtomicFile();
     AtomicFile(const AtomicFile&) = delete;
@@ -36,12 +43,14 @@ class AtomicFile {
     void publish();
 
   private:
-    void create_temporary(const std::filesystem::path& folder);
+    void create_temporary(const std::filesystem::path& folder, Access access);
+    void take_permissions();
     bool is_created_file(const struct stat& status) const;
 
     std::filesystem::path path_, temporary_;
     dev_t device_ = 0;
     ino_t inode_ = 0;
+    std::optional<mode_t> permissions_;  // of the file that is replaced
     bool published_ = false;
 };
 
@@ -52,13 +61,13 @@ void write_atomically(const std::filesystem::path& path,
 
 // Writes content that is in memory; errors as above.
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
-void write_atomically(const std::filesystem::path& path, std::string_view content);
+void write_atomically(const std::filesystem::path& path, std::string_view content, Access access = Access::shared);
 
 // Writes content that is never in memory as a whole: `fill` calls `append` with one piece after the other.
 // Errors as above.
 using AppendPiece = std::function<void(std::string_view piece)>;
 void write_pieces_atomically(const std::filesystem::path& path,
-                             const std::function<void(const AppendPiece& append)>& fill);
+                             const std::function<void(const AppendPiece& append)>& fill, Access access = Access::shared);
 
 // Returns the final name of a temporary file of the functions above ("cloud.vdb" for
 // ".cloud.part123-456.vdb"), or "" for any other name. A killed process leaves such files behind.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/branch.h"
 
+#include <algorithm>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -84,6 +85,25 @@ void copy_statistics(const std::filesystem::path& from, const std::filesystem::p
     write_atomically(to, rows);
 }
 
+// Frames are counted on from those of the other run. Throws Error(usage) where the scene's numbers and times put a frame that
+// is still to come among those that have been, or the first one to come before the states that the checkpoint holds.
+void require_frames_after(const RunSettings& settings, std::uint64_t next_step, const BranchPoint& point) {
+    if (settings.statistics_only) return;  // there are none
+    const Scene& scene = settings.scene;
+    const int next = point.next_frame, last = settings.range.last_frame, before = std::min(next - 1, last);
+    const auto time_s = [&](int number) { return frame_time_s(scene.frames, number - 1); };
+    const double branch_s = double(next_step == 0 ? 0 : next_step - 1) * scene.automaton.time_step_s;
+    const auto fail = [&](int number, const char* what) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: its frames go on with number {}, and frame {} of the scene, at {:g} s, is {} the run "
+                                "branches off at, {:g} s: expected `frames.start_s` such that frame {} is the first one from "
+                                "there on",
+                                point.checkpoint.string(), next, number, time_s(number), what, branch_s, next));
+    };
+    if (before > 0 && steps_up_to(moment_of_frame(scene, before - 1)) >= next_step) fail(before, "after the moment that");
+    if (next <= last && steps_up_to(moment_of_frame(scene, next - 1)) + 1 < next_step) fail(next, "before the moment that");
+}
+
 }  // namespace
 
 void branch_off(RunSettings& settings, const std::filesystem::path& from) {
@@ -96,7 +116,9 @@ void branch_off(RunSettings& settings, const std::filesystem::path& from) {
             fmt::format("{}: was saved at step {}, but the scene ends at step {}: expected more `time.steps`",
                         file.string(), saved.next_step, settings.scene.steps));
     }
-    branch_off(settings, point_of(checkpoint, file));
+    BranchPoint point = point_of(checkpoint, file);
+    require_frames_after(settings, saved.next_step, point);
+    branch_off(settings, std::move(point));
 }
 
 void branch_off(RunSettings& settings, BranchPoint point) {

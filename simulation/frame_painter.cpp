@@ -102,14 +102,6 @@ FramePainter::FramePainter(const Scene& scene, const DeviceOptions& device)
     painter_.use_terrain(read_terrain(scene));
 }
 
-FramePainter::FileState FramePainter::state_of(const std::filesystem::path& file) {
-    FileState state{.path = file};
-    std::error_code none;
-    if (const std::uintmax_t bytes = std::filesystem::file_size(file, none); !none) state.bytes = bytes;
-    if (const auto time = std::filesystem::last_write_time(file, none); !none) state.time = time;
-    return state;
-}
-
 // Without what only covers it.
 FramePainter::Ground FramePainter::ground_of(const Scene& scene) {
     Ground ground{.options = scene.render.terrain, .height_m = scene.render.ground.height_m};
@@ -117,19 +109,19 @@ FramePainter::Ground FramePainter::ground_of(const Scene& scene) {
     ground.options.rock_slope_deg = plain.rock_slope_deg;
     ground.options.rock_albedo = plain.rock_albedo;
     ground.options.snow_line_m = plain.snow_line_m;
-    if (ground.options.height_map) ground.file = state_of(*ground.options.height_map);
+    if (ground.options.height_map) ground.file = file_stamp(*ground.options.height_map);
     return ground;
 }
 
-std::vector<FramePainter::FileState> FramePainter::textures_of(const Scene& scene) {
-    std::vector<FileState> states;
-    for (const TextureFile& texture : texture_files(scene)) states.push_back(state_of(texture.file));
-    return states;
+FileStamps FramePainter::textures_of(const Scene& scene) {
+    FileStamps stamps;
+    for (const TextureFile& texture : texture_files(scene)) stamps.emplace(texture.file, file_stamp(texture.file));
+    return stamps;
 }
 
 void FramePainter::set_scene(const Scene& scene, bool same_layers) {
     Ground ground = ground_of(scene);  // before they are read
-    std::vector<FileState> files = textures_of(scene);
+    FileStamps files = textures_of(scene);
     const bool same_textures = files == textures_, same_terrain = ground == ground_;
     if (same_layers && same_textures && same_terrain) {
         scene_ = scene;

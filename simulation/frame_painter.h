@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "core/file_stamp.h"
 #include "density/metaballs.h"
 #include "render/image/picture.h"
 #include "render/rain/precipitation.h"
@@ -81,29 +82,21 @@ class FramePainter {
                     std::optional<std::size_t> layer, double time_s, std::size_t first, std::size_t count,
                     std::vector<DetailedVoxels>& to) const;
 
-    // A file as it was when it was read; one that is not there has neither size nor time.
-    struct FileState {
-        std::filesystem::path path;
-        std::uintmax_t bytes = 0;
-        std::filesystem::file_time_type time{};
-        bool operator==(const FileState&) const = default;
-    };
-    static FileState state_of(const std::filesystem::path& file);
     // What the height map and the textures of a scene are made of.
     struct Ground {
         TerrainOptions options;  // that shape it
         double height_m = 0;
-        std::optional<FileState> file;
+        std::optional<FileStamp> file;
         bool operator==(const Ground&) const = default;
     };
     static Ground ground_of(const Scene& scene);
-    static std::vector<FileState> textures_of(const Scene& scene);
+    static FileStamps textures_of(const Scene& scene);
 
     Scene scene_;
     Renderer renderer_;
     SkyPainter painter_;
     Ground ground_;                     // of the painter's height map
-    std::vector<FileState> textures_;  // of its textures
+    FileStamps textures_;  // of its textures
 };
 
 // Returns the rain or snow of a frame as the renderer draws it: the curtains of all layers, from the ground of

@@ -176,6 +176,9 @@ class Recorder : public SimulationSink {
         hash_saved_ = state_.state_hash;
     }
 
+    // The files are as they should be, and stay.
+    void leave_complete() { state_.complete = true; }
+
     // The video of all frames, unless it is there already. One of a shorter run is made anew.
     void start_video(const Simulation& simulation) {
         if (!settings_.render || !wants_video(settings_.scene)) return;
@@ -397,8 +400,10 @@ bool wants_video(const Scene& scene) { return scene.frames.enabled && scene.fram
 
 RunSettings run_settings(Scene scene, const std::string& scene_file, RunStart from) {
     RunSettings settings;
+    settings.stamps = stamps_of(scene, true);
+    scene = with_files(std::move(scene));
     if (from == RunStart::checkpoint) {
-        settings.simulation_hash = simulation_hash(scene, hash_of_files(with_files(scene)));
+        settings.simulation_hash = simulation_hash(scene, hash_of_files(scene));
     } else {
         SimulationStart start = simulation_start(scene);
         settings.initial = std::move(start.initial);
@@ -440,6 +445,9 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
                      : settings.branch ? branched_simulation(settings, folder)
                                        : Simulation(settings.scene, settings.range, settings.simulation_hash,
                                                     std::move(settings.initial), settings.results()));
+    // Of the layers, of the pictures and for the checksums files were read at different times.
+    if (const auto changed = first_changed(settings.stamps))
+        throw Error(ErrorCode::io, changed->string() + ": was changed while the run began: give the same command again");
     recorder.set_inputs(std::move(inputs));
     const std::uint64_t first_step = simulation.steps_taken();
     if (settings.resume) {
@@ -452,6 +460,14 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         recorder.begin();
     }
     recorder.start_video(simulation);
+    const bool was_complete = settings.resume && simulation.finished() && read_manifest(folder.manifest()).complete;
+    if (was_complete && settings.checkpoint && !recorder.makes_video()) {
+        recorder.leave_complete();
+        RunReport report = report_of(recorder, settings, simulation);
+        report.first_step = first_step;
+        report.skipped = true;
+        return report;
+    }
 
     try {
         simulate(simulation, recorder, settings, observer, lock, begin);

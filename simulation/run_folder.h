@@ -23,6 +23,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/file_stamp.h"
 #include "render/renderer.h"
 #include "scenes/format/scene.h"
 #include "simulation/simulation.h"
@@ -66,6 +67,7 @@ struct RunSettings {
     std::string scene_text;          // canonical
     std::string scene_hash;          // of everything in the scene
     std::string simulation_hash;     // of what decides the automaton's bits
+    FileStamps stamps;               // of the files that the scene names, before the first of them was read
     SimulationRange range;
     bool statistics_only = false;  // no frames: statistics of every step (SimulationResults::statistics)
     bool render = true;            // pictures too
@@ -116,7 +118,7 @@ struct RunReport {
     std::filesystem::path folder;
     std::uint64_t last_step = 0;  // that the run has or will have
     bool complete = false;
-    bool skipped = false;              // it was complete before, without a checkpoint: nothing was done
+    bool skipped = false;              // it was complete before: nothing was done
     bool restarted = false;            // there was an earlier run, but no checkpoint to go on from
     std::uint64_t first_step = 0;      // 0, or where it was resumed
     std::uint64_t steps_taken = 0;     // by the automaton, those ahead of the results included

@@ -10,6 +10,7 @@
 #include "density/vdb/vdb_file.h"
 #include "render/image/alpha_image.h"
 #include "scenes/format/errors.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/text.h"
 #include "simulation/billboard_files.h"
 #include "simulation/layer_simulation.h"
@@ -124,6 +125,16 @@ std::string hash_of_files(const Scene& scene) {
         add(digest, *grid.samples);
     }
     return any ? digest.hex() : std::string();
+}
+
+FileStamps stamps_of(const Scene& scene, bool pictures) {
+    FileStamps stamps;
+    Scene named = scene;
+    for_each_file(named, [&](const std::string&, FileKind kind, const std::filesystem::path& file) {
+        if (pictures || kind != FileKind::picture) stamps.emplace(file, file_stamp(file));
+        return file;
+    });
+    return stamps;
 }
 
 std::shared_ptr<const HeightMap> read_terrain(const Scene& scene) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/file_stamp.h"
 #include "render/terrain/terrain.h"
 #include "scenes/format/scene.h"
 
@@ -38,6 +39,10 @@ Scene with_files(Scene scene);
 
 // Returns a text that differs where their values differ; empty without files. `scene` as with_files() returns it.
 std::string hash_of_files(const Scene& scene);
+
+// Returns the stamps of the files that the scene names, at this moment; `pictures`: those of pictures, too. Whoever reads
+// the files more than once compares: all of it is of one content where no stamp has changed.
+FileStamps stamps_of(const Scene& scene, bool pictures);
 
 // Returns make_terrain() of the scene. Throws as it does, with the place of the height map.
 std::shared_ptr<const HeightMap> read_terrain(const Scene& scene);

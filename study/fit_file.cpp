@@ -46,6 +46,7 @@ std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem:
     if (!scene) return std::nullopt;
     base.scene_file = folder / *scene;
     try {
+        base.source.emplace(base.scene_file);
         const SweepPlan plan(base);
         const AutomatonOptions lattice = automaton_options(plan.scene(), plan.measured_lattice());
         return Measured{*scene, lattice.extent, lattice.placement.cell_size_m, lattice.placement.origin_m.z};
@@ -71,7 +72,7 @@ bool check_end(TomlTable& parameter, TomlTable& prior, const std::string& end, c
     std::vector<std::string> overrides = base.overrides;
     overrides.push_back(key + "=" + number_text(value));
     try {
-        read_scene(base.scene_file, overrides, SceneUse::without_frames);
+        base.source->read(overrides, SceneUse::without_frames);
     } catch (const SceneErrors& errors) {
         for (const Problem& problem : errors.problems()) {
             if (problem.where.line == 0 && problem.where.column <= int(key.size())) {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "study/folder_contents.h"
 #include "study/placed_scene.h"
 #include "study/tables.h"
 #include <fmt/format.h>
@@ -97,8 +98,7 @@ void write_results(const FitOptions& options, const FitResult& result, const std
         for (const std::string& key : options.problem.parameters[d].keys)
             overrides.push_back(key + "=" + number_text(result.best[d]));
     write_atomically(folder / "fitted.toml",
-                     to_toml(placed_scene(
-                         read_scene(options.base.scene_file, overrides, SceneUse::without_frames), folder)));
+                     to_toml(placed_scene(options.base.source->read(overrides, SceneUse::without_frames), folder)));
 
     using Json = nlohmann::ordered_json;
     const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(); };
@@ -149,12 +149,17 @@ void write_results(const FitOptions& options, const FitResult& result, const std
 std::optional<FitResult> run_fit(const FitOptions& options, const SweepJob& job,
                                  const std::function<void(int wave, const SweepProgress&)>& progress,
                                  const std::function<bool()>& stop) {
+    require_fit_folder(job.folder);
     // Bad ends of a prior are found before the first run.
     std::vector<std::vector<double>> ends;
     for (const double unit : {0.0, 1.0}) ends.emplace_back(options.problem.parameters.size(), unit);
-    plan_of(options, ends);
+    const std::string simulation_hash = plan_of(options, ends).simulation_hash();
     const Simulate simulate = [&](int wave, const std::vector<std::vector<double>>& points) {
         const SweepPlan plan = plan_of(options, points);
+        if (plan.simulation_hash() != simulation_hash)
+            throw Error(ErrorCode::io, options.base.scene_file.string() +
+                                           ": a file that the scene names was changed after the fit began: the same "
+                                           "command fits with what is in it now");
         SweepJob part = job;
         part.folder = job.folder / (wave == 4 ? "proof" : fmt::format("wave-{}", wave));
         const SweepReport report = run_sweep(

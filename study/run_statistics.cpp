@@ -272,9 +272,11 @@ bool is_of_snapshots(std::string_view statistic) {
     return std::ranges::count(kNames, statistic) > 0;
 }
 
-RunResult run_for_statistics(const Scene& scene, const SweepOptions& options, bool with_thumbnail) {
+RunResult run_for_statistics(const Scene& scene, const SweepOptions& options, bool with_thumbnail,
+                             const std::function<void()>& files_are_read) {
     const StepRules& rules = options.steps;
     Measurement measurement(scene, options);
+    if (files_are_read) files_are_read();
     std::uint64_t steps = rules.min;
     const auto is_exact = [&](const Judgement& judgement) {
         if (judgement.regime == Regime::not_steady) return false;

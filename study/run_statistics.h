@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -105,7 +106,9 @@ struct RunResult {
 };
 
 // Runs the scene from its start by the rules of `options`, which has its `layer` set where the scene has layers. Throws as
-// LayerSimulation. The result does not depend on the number of threads.
-RunResult run_for_statistics(const Scene& scene, const SweepOptions& options, bool with_thumbnail = true);
+// LayerSimulation. Calls `files_are_read` when it has read all that the scene names. The result does not depend on the number
+// of threads.
+RunResult run_for_statistics(const Scene& scene, const SweepOptions& options, bool with_thumbnail = true,
+                             const std::function<void()>& files_are_read = {});
 
 }  // namespace nephos

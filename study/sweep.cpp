@@ -8,6 +8,7 @@
 #include <set>
 #include <span>
 
+#include "study/folder_contents.h"
 #include "study/sweep_file.h"
 #include "study/workers.h"
 #include <fcntl.h>
@@ -146,6 +147,7 @@ SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records&
 }  // namespace
 
 void write_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
+    require_sweep_folder(folder);
     const FolderGuard guard(folder);
     require_place_for(plan, guard, folder);
     place_plan(plan, folder);
@@ -164,6 +166,7 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<void(const SweepProgress&)>& progress,
                       const std::function<bool()>& stop) {
     const Clock::time_point begin = Clock::now();
+    require_sweep_folder(job.folder);
     std::optional<FolderGuard> guard(job.folder);
     require_place_for(plan, *guard, job.folder);
     if (job.overwrite) remove_shards(job.folder, job.shard, job.shards);
@@ -196,16 +199,20 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
     const auto next = [&]() -> std::optional<std::uint64_t> {
         while (at < plan.runs() && !is_wanted(plan.run(at))) ++at;
         if (give_up || at == plan.runs()) return std::nullopt;
+        plan.require_files();
         return at++;
     };
     const Task task = [&](std::uint64_t number) {
         const PlannedRun run = plan.run(number);
-        return packed(run_for_statistics(plan.scene_of(run), plan.options(), run.replicate == 0));
+        const Scene scene = plan.scene_of(run);
+        return packed(run_for_statistics(scene, plan.options(), run.replicate == 0,
+                                         [&] { plan.require_files_of(scene); }));
     };
     const TaskEnd end = [&](std::uint64_t number, const std::string& result,
                             const std::optional<std::string>& failure) {
         const PlannedRun run = plan.run(number);
         if (failure) {
+            plan.require_files();  // it failed for that
             shard.add_failure(run, *failure);
             ++count.failed;
             give_up = give_up || job.fail_fast;

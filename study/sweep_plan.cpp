@@ -159,6 +159,13 @@ void check_options(const SweepOptions& options) {
     if (point_count(options) > kMaxPoints) fail(fmt::format("the grid has more than {} points", kMaxPoints));
 }
 
+// Throws Error(io) when one of the files has changed.
+void require(const FileStamps& stamps) {
+    if (const auto changed = first_changed(stamps))
+        throw Error(ErrorCode::io, changed->string() + ": was changed after the sweep began: the same command goes on with "
+                                                       "what is in it now");
+}
+
 }  // namespace
 
 std::string canonical_key(std::string_view key) {
@@ -199,7 +206,9 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
         for (std::string& value : axis.values) value = canonical_value(value);
     }
     check_options(options_);
-    scene_ = read_scene(options_.scene_file, options_.overrides, SceneUse::without_frames);
+    if (!options_.source) options_.source.emplace(options_.scene_file);
+    scene_ = options_.source->read(options_.overrides, SceneUse::without_frames);
+    stamps_ = stamps_of(scene_, false);
     std::vector<std::string> lattices;
     for (const LayerOptions& layer : scene_.layers)
         if (layer.automaton && !layer.is_veil) lattices.push_back(layer.name);
@@ -242,7 +251,7 @@ Scene SweepPlan::check_value(std::size_t axis_number, std::size_t n, const std::
     Axis& axis = options_.axes[axis_number];
     std::vector<std::string> overrides = options_.overrides;
     for (const std::string& key : axis.keys) overrides.push_back(key + "=" + value);
-    Scene scene = read_scene(options_.scene_file, overrides, SceneUse::without_frames);
+    Scene scene = options_.source->read(overrides, SceneUse::without_frames);
     bool has_files = false;
     std::string placed = value;
     for_each_file(scene, [&](const std::string& key, FileKind, const std::filesystem::path& file) {
@@ -264,6 +273,7 @@ Scene SweepPlan::check_value(std::size_t axis_number, std::size_t n, const std::
     });
     if (!has_files) return scene;
     axis.values[n] = placed;
+    stamps_.merge(stamps_of(scene, false));
     contents_[axis_number][placed] = simulation_start(scene).simulation_hash;
     return scene;
 }
@@ -394,10 +404,18 @@ Scene SweepPlan::scene_of(const PlannedRun& run) const {
     std::vector<std::string> overrides = options_.overrides;
     for (std::size_t n = 0; n < run.values.size(); ++n)
         for (const std::string& key : options_.axes[n].keys) overrides.push_back(key + "=" + run.values[n]);
-    Scene scene = read_scene(options_.scene_file, overrides, SceneUse::without_frames);
+    Scene scene = options_.source->read(overrides, SceneUse::without_frames);
     scene.automaton.seed = run.seed;
     return scene;
 }
+
+void SweepPlan::require_files_of(const Scene& scene) const {
+    FileStamps planned;
+    for (const auto& [path, now] : stamps_of(scene, false)) planned[path] = stamps_.at(path);
+    require(planned);
+}
+
+void SweepPlan::require_files() const { require(stamps_); }
 
 std::string SweepPlan::options_of(const PlannedRun& run) const {
     std::string command;

@@ -22,6 +22,8 @@
 
 #include "study/design.h"
 
+#include "core/file_stamp.h"
+#include "scenes/format/reader.h"
 #include "scenes/format/scene.h"
 
 namespace nephos {
@@ -56,6 +58,7 @@ struct StepRules {
 
 struct SweepOptions {
     std::filesystem::path scene_file;
+    std::optional<SceneSource> source;   // what is in that file; none: the plan reads it
     std::vector<std::string> overrides;  // of all runs, as of --set
     Design design = Design::grid;
     std::uint64_t points = 0;  // of designs other than grid and list
@@ -95,8 +98,13 @@ class SweepPlan {
     std::uint64_t runs() const { return points_ * options_.replicates; }
     std::vector<std::string> values_of_point(std::uint64_t point) const;
     PlannedRun run(std::uint64_t number) const;
-    // Returns the scene of a run. Throws as read_scene().
+    // Returns the scene of a run, as its text was when the plan was made. Throws as read_scene().
     Scene scene_of(const PlannedRun& run) const;
+    // Throws Error(io) that names a file of the scene of a run, or of any, that is not as it was when the plan was made: the
+    // run has another id.
+    void require_files_of(const Scene& scene) const;
+    void require_files() const;
+    const std::string& simulation_hash() const { return simulation_hash_; }  // of scene()
     // Returns the options of scene_of(), quoted for a shell: "--set KEY=VALUE ... --seed N".
     std::string options_of(const PlannedRun& run) const;
     // Returns the command that repeats so many steps of a run, in the folder of the sweep: "nephos run ...".
@@ -115,6 +123,7 @@ class SweepPlan {
 
     SweepOptions options_;
     Scene scene_;
+    FileStamps stamps_;  // of the files of all runs, before they were read
     std::string simulation_hash_;
     std::vector<std::map<std::string, std::string>>
         contents_;  // of each axis: by value, of the files that it names

@@ -91,9 +91,10 @@ void AutosaveFile::claim(const fs::path& folder, const std::string& name) {
     std::error_code error;
     fs::create_directories(folder, error);
     if (error) fail(folder, "cannot create the folder", error.value());
+    // For this user alone: the scene itself may be.
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
         const fs::path path = numbered(folder, name, attempt);
-        Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+        Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
         if (file.get() < 0 && errno == EEXIST) continue;
         if (file.get() < 0) fail(path, "cannot be written", errno);
         lock(file.get());

@@ -4,8 +4,6 @@
 #include <system_error>
 #include <utility>
 
-#include <sys/stat.h>
-
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "scenes/format/reader.h"
@@ -17,6 +15,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostHistoryBytes = 256u << 20;
+// Returns nothing where there is no file.
+std::optional<FileStamp> stamp_of(const fs::path& path) {
+    const FileStamp stamp = file_stamp(path);
+    return stamp == FileStamp{} ? std::nullopt : std::optional(stamp);
+}
+
 }  // namespace
 
 SceneDocument::SceneDocument(std::string text, std::string name, fs::path folder)
@@ -98,15 +102,6 @@ void SceneDocument::redo() {
 }
 
 fs::path SceneDocument::folder() const { return has_file_ ? fs::absolute(path_).parent_path() : folder_; }
-
-std::optional<SceneDocument::FileStamp> SceneDocument::stamp_of(const fs::path& path) {
-    struct stat status {};
-    if (::stat(path.c_str(), &status) != 0) return std::nullopt;
-    std::error_code error;
-    FileStamp stamp{fs::last_write_time(path, error), std::uintmax_t(status.st_size),
-                    std::uintmax_t(status.st_ino)};
-    return error ? std::nullopt : std::optional(stamp);
-}
 
 // The stamp is taken before the text: a version that is written meanwhile has another one, and is read instead.
 SceneDocument::FileText SceneDocument::read_file(const fs::path& path) {
@@ -210,8 +205,10 @@ void SceneDocument::take_autosave(const LeftAutosave& left) {
 }
 
 std::optional<fs::file_time_type> SceneDocument::file_newer_than(const LeftAutosave& left) const {
-    if (has_file_ && file_stamp_ && file_stamp_->time > left.time) return file_stamp_->time;
-    return std::nullopt;
+    if (!has_file_ || file_stamp_ != stamp_of(path_)) return std::nullopt;  // another version than the one that was read
+    std::error_code error;
+    const fs::file_time_type time = fs::last_write_time(path_, error);
+    return !error && time > left.time ? std::optional(time) : std::nullopt;
 }
 
 }  // namespace nephos

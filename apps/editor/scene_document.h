@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "apps/editor/autosave.h"
+#include "core/file_stamp.h"
 #include "scenes/format/document.h"
 #include "scenes/format/errors.h"
 #include "scenes/format/scene.h"
@@ -91,17 +92,10 @@ class SceneDocument {
     struct Version {
         std::string text, what;
     };
-    // Tells one version of a file from another.
-    struct FileStamp {
-        std::filesystem::file_time_type time;
-        std::uintmax_t size = 0, inode = 0;
-        bool operator==(const FileStamp&) const = default;
-    };
     struct FileText {
         std::string text;
         std::optional<FileStamp> stamp;  // none: the file changed while it was read
     };
-    static std::optional<FileStamp> stamp_of(const std::filesystem::path& path);
     static FileText read_file(const std::filesystem::path& path);
     void read();
     void take_from_disk(FileText now);

@@ -3,15 +3,20 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 #include <sstream>
 
 #include <fmt/format.h>
+#include <pwd.h>
+#include <unistd.h>
 
 #include "core/atomic_file.h"
+#include "core/descriptor.h"
+#include "core/error.h"
 
 namespace nephos {
 namespace {
+
+constexpr std::size_t kMostBytes = std::size_t(1) << 20;
 
 template <typename Number>
 void take(const std::string& text, Number min, Number max, Number& value) {
@@ -28,12 +33,23 @@ std::filesystem::path settings_folder() {
         return std::filesystem::path(folder) / "nephos";
     }
     const char* home = std::getenv("HOME");
-    return std::filesystem::path(home != nullptr ? home : "/tmp") / ".config" / "nephos";
+    if (home == nullptr || *home != '/') {
+        const passwd* user = ::getpwuid(::geteuid());
+        // Never a folder that all may write to: another user would have made its own in it.
+        home = user != nullptr && user->pw_dir != nullptr ? user->pw_dir : "/nonexistent";
+    }
+    return std::filesystem::path(home) / ".config" / "nephos";
 }
 
 Settings read_settings(const std::filesystem::path& folder) {
     Settings settings;
-    std::ifstream file(folder / "editor.conf");
+    std::string text;
+    try {
+        text = read_beginning(folder / "editor.conf", kMostBytes);
+    } catch (const Error&) {
+        return settings;  // there are none yet, or none that can be read: those that a new user has
+    }
+    std::istringstream file(text);
     for (std::string line; std::getline(file, line);) {
         const std::size_t equals = line.find(" = ");
         if (equals == std::string::npos) continue;
@@ -47,7 +63,7 @@ Settings read_settings(const std::filesystem::path& folder) {
         if (key == "plots") settings.plots = value != "off";
         if (key == "shapes") settings.shapes = value != "off";
         if (key == "theme") settings.dark = value != "light";
-        if (key == "scale") take(value, 0.0f, 4.0f, settings.scale);
+        if (key == "scale" && value != "0") take(value, kSmallestTextScale, kLargestTextScale, settings.scale);
         if (key == "recent" && settings.recent.size() < kMostRecent) settings.recent.push_back(value);
     }
     return settings;

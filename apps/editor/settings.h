@@ -11,6 +11,9 @@
 
 namespace nephos {
 
+// Of texts and controls; 1 is for 96 dots an inch.
+inline constexpr float kSmallestTextScale = 0.5f, kLargestTextScale = 4;
+
 struct Settings {
     int width = 1360, height = 860;               // of the window
     float left = 250, right = 390, bottom = 190;  // of the panels, at scale 1

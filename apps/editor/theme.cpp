@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Colours, spacing and font of the interface.
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 
@@ -55,6 +56,7 @@ void colours(bool dark) {
 void apply_theme(Editor& editor) {
     float scale = editor.options.scale > 0 ? float(editor.options.scale) : editor.settings.scale;
     if (scale <= 0) scale = editor.window->content_scale();
+    scale = std::clamp(scale, kSmallestTextScale, kLargestTextScale);
     ImGuiStyle& style = ImGui::GetStyle();
     style = ImGuiStyle();
     style.WindowRounding = 0;
@@ -68,9 +70,9 @@ void apply_theme(Editor& editor) {
     style.ItemSpacing = ImVec2(7, 5);
     style.IndentSpacing = 15;
     style.ScrollbarSize = 13;
-    style.WindowMinSize = ImVec2(1, 1);
     colours(editor.settings.dark);
     style.ScaleAllSizes(scale);
+    style.WindowMinSize = ImVec2(1, 1);  // the least that ImGui takes
     ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
     fonts.Clear();
     const float pixels = std::floor(kFontPixels * scale);

@@ -5,10 +5,12 @@
 //     mpirun -n 4 nephos-mpi SCENE --steps 100 --hash --out big
 
 #include <algorithm>
-#include <cmath>
+#include <cerrno>
+#include <charconv>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
-#include <fstream>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,10 +21,12 @@
 #include <tbb/global_control.h>
 
 #include "apps/mpi/ranks.h"
+#include "apps/mpi/statistics_table.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "density/vdb/vdb_file.h"
 #include "scenes/format/reader.h"
+#include "simulation/layer_simulation.h"
 #include "simulation/scene_files.h"
 
 namespace nephos {
@@ -34,20 +38,8 @@ struct Arguments {
     std::optional<std::uint64_t> steps, seed;
     std::string out;
     int slab_levels = 8, threads = 1;
-    bool hash = false, write_state = false;
+    bool hash = false, write_state = false, overwrite = false;
 };
-
-// The text of a number, nothing where there is none.
-std::string field(double value) { return std::isfinite(value) ? number_text(value) : std::string(); }
-
-// A row of statistics.csv, with the columns of the command that bits alone have.
-void write_row(std::ofstream& file, std::uint64_t step, double time_s, const CloudStatistics& s,
-               const std::string& hash) {
-    file << fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", step, number_text(time_s), s.hum, s.act,
-                        s.cld, field(s.cover), field(s.base_m), field(s.top_m), field(s.base_mean_m),
-                        field(s.top_mean_m), field(s.perimeter_m), hash);
-    if (!file.flush()) throw Error(ErrorCode::io, "statistics.csv: cannot write");
-}
 
 // Writes cld of the own levels, some at a time, as files that stand in their place in the world: a tree of OpenVDB is made of
 // these levels alone, and no dense copy of anything.
@@ -79,25 +71,20 @@ void simulate(const Arguments& a) {
     AutomatonOptions options = scene.automaton;
     if (a.seed) options.seed = *a.seed;
     Ranks ranks(options);
-    std::ofstream table;
-    if (!a.out.empty() && ranks.rank() == 0) {
-        std::filesystem::create_directories(a.out);
-        table.open(std::filesystem::path(a.out) / "statistics.csv");
-        if (!table) throw Error(ErrorCode::io, a.out + "/statistics.csv: cannot write");
-        table << "step,time_s,hum,act,cld,cloud_cover,base_m,top_m,base_mean_m,top_mean_m,perimeter_m,hash\n";
-    }
+    std::optional<StatisticsTable> table;
+    if (!a.out.empty() && ranks.rank() == 0) table.emplace(a.out, a.overwrite);
     const std::uint64_t steps = a.steps.value_or(scene.steps);
     for (std::uint64_t step = 0;; ++step) {
         std::string hash;
         if (a.hash) hash = ranks.hash().hex();
         if (!a.out.empty()) {
             const CloudStatistics statistics = ranks.statistics();
-            if (ranks.rank() == 0)
-                write_row(table, step, double(step) * options.time_step_s, statistics, hash);
+            if (table) table->add(step, double(step) * options.time_step_s, statistics, hash);
         }
         if (a.hash && ranks.rank() == 0) {
-            fmt::print("{} {}\n", step, hash);
-            std::fflush(stdout);
+            const std::string line = fmt::format("{} {}\n", step, hash);
+            if (std::fputs(line.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
+                throw Error(ErrorCode::io, std::string("standard output: cannot write: ") + std::strerror(errno));
         }
         if (step == steps) break;
         ranks.step();
@@ -108,17 +95,31 @@ void simulate(const Arguments& a) {
     }
 }
 
+// As the numbers of the command: decimal digits alone.
+CLI::Validator whole_number(std::uint64_t max) {
+    return {[max](const std::string& text) {
+                std::uint64_t number = 0;
+                const char* end = text.data() + text.size();
+                const auto [last, error] = std::from_chars(text.data(), end, number);
+                if (error == std::errc() && last == end && number <= max) return std::string();
+                return fmt::format("'{}' is not a whole number from 0 to {}", text, max);
+            },
+            "N"};
+}
+
 int parse(CLI::App& app, int argc, char** argv, Arguments& a) {
     app.add_option("SCENE", a.scene, "Scene of one lattice, without layers")->required();
     app.add_option("--set", a.settings, "KEY=VALUE of the scene; may be repeated")
         ->expected(1)
         ->allow_extra_args(false)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    app.add_option("--seed", a.seed, "Seed instead of the scene's")->check(CLI::NonNegativeNumber);
-    app.add_option("--steps", a.steps, "Steps instead of the scene's time.steps")
-        ->check(CLI::NonNegativeNumber);
+    app.add_option("--seed", a.seed, "Seed instead of the scene's")
+        ->check(whole_number(std::numeric_limits<std::uint64_t>::max()));
+    app.add_option("--steps", a.steps, "Steps instead of the scene's time.steps")->check(whole_number(kMaxSteps));
     app.add_flag("--hash", a.hash, "Print the state hash after every step, as `nephos hash` does");
-    app.add_option("-o,--out", a.out, "Folder for statistics.csv, with a row a step");
+    app.add_option("-o,--out", a.out, "Folder for statistics.csv, with a row a step")
+        ->check([](const std::string& text) { return text.empty() ? std::string("expected a folder") : std::string(); });
+    app.add_flag("--overwrite", a.overwrite, "Replace statistics.csv and levels of an earlier call")->needs("--out");
     app.add_flag("--write-state", a.write_state,
                  "Write the last state's cld to --out, as VDB files of some levels each")
         ->needs("--out");

@@ -186,6 +186,12 @@ Scene load_scene(const SceneArguments& arguments, SceneUse use) {
     return scene;
 }
 
+void refuse_to_replace(const std::string& from, const std::string& to) {
+    std::error_code error;
+    if (!to.empty() && std::filesystem::equivalent(from, to, error))
+        throw Error(ErrorCode::usage, to + ": is the file that is read: expected the name of another one to write");
+}
+
 void print_scene_errors(const SceneErrors& errors) {
     const std::string plain = "error:";
     const std::string coloured = styled(plain, Style::red, colours_on(stderr));

@@ -76,6 +76,9 @@ DeviceOptions device_options(const DeviceArguments& arguments, const FrameOption
 // Returns the scene with its changes applied. Throws as read_scene().
 Scene load_scene(const SceneArguments& arguments, SceneUse use = SceneUse::everything);
 
+// Throws Error(usage) when the file to write is the one that was read; `to` may be empty.
+void refuse_to_replace(const std::string& from, const std::string& to);
+
 // Prints every problem on standard error, "error:" in colour on a terminal.
 void print_scene_errors(const SceneErrors& errors);
 

@@ -106,6 +106,7 @@ void explain(const MetarArguments& a, const Taf& taf) {
 int metar(const MetarArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     const std::string text = report_of(a.report);
+    if (a.report.starts_with('@')) refuse_to_replace(a.report.substr(1), a.scene);
     std::optional<Taf> taf;
     Metar report;
     if (is_taf(text)) {

@@ -102,6 +102,7 @@ RunSettings settings_of(const RunArguments& a) {
     RunSettings settings =
         run_settings(std::move(scene), scene_file,
                      continued.branch || !a.from.empty() ? RunStart::checkpoint : RunStart::first_state);
+    settings.statistics_only = a.statistics_only;
     if (a.frames) settings.range = range_of_frames(settings.scene, a.frames->first, a.frames->last);
     if (!a.out.empty()) settings.folder = a.out;
     if (continued.branch && (a.frames || a.until))
@@ -111,7 +112,6 @@ RunSettings settings_of(const RunArguments& a) {
     } else if (!a.from.empty()) {
         branch_off(settings, a.from);
     }
-    settings.statistics_only = a.statistics_only;
     settings.render = !a.no_render && !a.statistics_only;
     settings.device = device_options(a.device, settings.scene.frames);
     settings.resume = a.resume;

@@ -51,6 +51,7 @@ std::size_t chosen_layer(const StateArguments& a, const std::vector<LayerSimulat
 int state(const StateArguments& a) {
     const ThreadLimit limit(a.work.threads);
     const Scene scene = load_scene(a.scene, SceneUse::without_frames);
+    refuse_to_replace(a.scene.file, a.out);
     std::vector<LayerSimulation> layers = start_layers(scene, a.scene.file, a.from);
     const Automaton& automaton = *layers[chosen_layer(a, layers)].automaton();
     const std::uint64_t steps = a.steps.value_or(scene.steps);

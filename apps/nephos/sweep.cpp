@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "study/folder_contents.h"
 #include "study/sweep_file.h"
 #include "study/tables.h"
 #include <fmt/format.h>
@@ -286,6 +287,7 @@ int merge(const MergeArguments& a) {
     const Records records = records_of_folders(plan, folders);
     const std::string out = a.out.empty() ? a.folders.front() : a.out;
     print_problems(records.problems());
+    require_sweep_folder(out);
     const LostRuns lost = a.overwrite ? LostRuns{} : runs_lost(plan, records, out);
     if (lost.unreadable > 0)
         throw Error(ErrorCode::io,

@@ -11,26 +11,23 @@
 namespace nephos {
 
 SceneText SceneText::from_file(const std::filesystem::path& path) {
-    SceneText scene;
+    std::string text;
     try {
-        scene.text_ = read_text_file(path, kMaxSceneBytes);
+        text = read_text_file(path, kMaxSceneBytes);
     } catch (const Error& error) {
         throw Error(error.code(), error.what(), {path.string(), 0, 0});
     }
-    scene.label_ = path.string();
-    scene.folder_ = std::filesystem::absolute(path).parent_path();  // whatever the working folder is later
+    // Whatever the working folder is later.
+    SceneText scene({std::move(text), path.string(), std::filesystem::absolute(path).parent_path()});
     scene.read();
     return scene;
 }
 
 SceneText SceneText::from_text(std::string text, const std::filesystem::path& folder) {
-    SceneText scene;
-    scene.text_ = std::move(text);
-    scene.label_ = "scene";
     // Without a working folder it stays as it is: only scenes that name files need it.
     std::error_code error;
-    scene.folder_ = std::filesystem::absolute(folder.empty() ? "." : folder, error);
-    if (error) scene.folder_ = folder;
+    std::filesystem::path from = std::filesystem::absolute(folder.empty() ? "." : folder, error);
+    SceneText scene({std::move(text), "scene", error ? folder : std::move(from)});
     scene.read();
     return scene;
 }
@@ -46,7 +43,7 @@ std::string SceneText::canonical() const { return to_toml(scene_); }
 
 // Frames are not made of it: they need not fit into the simulated time.
 void SceneText::read() {
-    scene_ = read_scene_text(text_, label_, folder_, settings_, SceneUse::without_frames);
+    scene_ = source_.read(settings_, SceneUse::without_frames);
 }
 
 }  // namespace nephos

@@ -5,8 +5,10 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "scenes/format/reader.h"
 #include "scenes/format/scene.h"
 
 namespace nephos {
@@ -29,8 +31,9 @@ class SceneText {
   private:
     void read();
 
-    std::string text_, label_;
-    std::filesystem::path folder_;
+    explicit SceneText(SceneSource source) : source_(std::move(source)) {}
+
+    SceneSource source_;
     std::vector<std::string> settings_;
     Scene scene_;
 };

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -111,12 +112,15 @@ class Document {
     std::deque<Origin> origins_;
 };
 
+// Texts of files with base models, by path.
+using ModelTexts = std::map<std::string, std::string>;
+
 // Reads the key `models`, base models from other scene files: inserts the [[model]] tables of the files that
 // `models` names in front of the document's own, in the order of the list, so that they are read, checked,
 // written and hashed as if they stood in the scene. What else those files hold is ignored, their own `models`
 // too. A file is read once, however often it is named, and its models are inserted each time. A relative name is
 // relative to `folder`, one from a --set option to the current folder. Problems are reported, among them more files
-// than 1,000, and more of them than 64 MiB.
-void take_models_from_files(Document& document, const std::filesystem::path& folder);
+// than 1,000, and more of them than 8 MiB. `texts` is taken for what is in it, and added to.
+void take_models_from_files(Document& document, const std::filesystem::path& folder, ModelTexts& texts);
 
 }  // namespace nephos

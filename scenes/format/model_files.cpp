@@ -50,7 +50,8 @@ struct ModelFile {
 // The files that `models` names, each read once.
 class ModelFiles {
   public:
-    ModelFiles(Document& document, const fs::path& folder) : document_(document), folder_(folder) {}
+    ModelFiles(Document& document, const fs::path& folder, ModelTexts& texts)
+        : document_(document), folder_(folder), texts_(texts) {}
 
     // Adds the [[model]] tables of a file; `name` is the item of `models` that names it. Returns false when there are
     // too many files, or they are too large, which is reported as any other problem.
@@ -80,14 +81,19 @@ class ModelFiles {
         return false;
     }
 
+    const std::string& text_of(const fs::path& path) {
+        const auto known = texts_.find(path.string());
+        if (known != texts_.end()) return known->second;
+        std::error_code error;
+        const fs::file_status status = fs::status(path, error);
+        if (fs::is_character_file(status) || fs::is_block_file(status)) require_regular_file(path);  // throws
+        return texts_[path.string()] = read_text_file(path, kMaxSceneBytes);
+    }
+
     ModelFile read(const fs::path& path, const fs::path& requested) {
         std::string text;
         try {
-            std::error_code error;
-            const fs::file_status status = fs::status(path, error);
-            if (fs::is_character_file(status) || fs::is_block_file(status))
-                require_regular_file(path);  // throws
-            text = read_text_file(path, kMaxSceneBytes);
+            text = text_of(path);
         } catch (const Error& error) {
             return {0,
                     {},
@@ -115,13 +121,14 @@ class ModelFiles {
 
     Document& document_;
     const fs::path& folder_;
+    ModelTexts& texts_;
     std::map<std::string, ModelFile> files_;
     std::size_t bytes_ = 0, missing_ = 0;
 };
 
 }  // namespace
 
-void take_models_from_files(Document& document, const fs::path& folder) {
+void take_models_from_files(Document& document, const fs::path& folder, ModelTexts& texts) {
     const Entry* files = document.root.find("models");
     if (files == nullptr) return;
     std::vector<Node> names{files->value};
@@ -129,7 +136,7 @@ void take_models_from_files(Document& document, const fs::path& folder) {
     if (many) names = files->value.items;
     std::vector<Node> models;
     const std::size_t problems = document.problems.size();
-    ModelFiles read(document, folder);
+    ModelFiles read(document, folder, texts);
     for (std::size_t n = 0;
          n < names.size() && models.size() <= std::size_t(kMaxModels) && !document.is_full(); ++n) {
         if (names[n].kind != Node::Kind::text) continue;  // reported when the scene is read

@@ -2,6 +2,8 @@
 #include "scenes/format/reader.h"
 
 #include <algorithm>
+#include <mutex>
+#include <utility>
 
 #include "scenes/format/document.h"
 #include "scenes/format/named_files.h"
@@ -195,15 +197,9 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
     return error ? folder : whole;
 }
 
-}  // namespace
-
-Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides, SceneUse use) {
-    return read_scene_text(read_text_file(path, kMaxSceneBytes), path.string(), folder_of(path), overrides,
-                           use);
-}
-
-Scene read_scene_text(std::string_view text, const std::string& label, const std::filesystem::path& folder,
-                      std::span<const std::string> overrides, SceneUse use) {
+// `models`: texts of files that were read before; those that are read now are added.
+Scene scene_of_text(std::string_view text, const std::string& label, const std::filesystem::path& folder,
+                    std::span<const std::string> overrides, SceneUse use, ModelTexts& models) {
     if (text.size() > kMaxSceneBytes) {
         throw_problem(label, "the file is larger than " + std::to_string(kMaxSceneBytes >> 20) + " MiB",
                       "expected a scene in TOML");
@@ -223,7 +219,7 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
     for (const std::string& option : overrides) {
         if (sets_model_files(option)) document.set(option, &describe);
     }
-    if (readable) take_models_from_files(document, folder);
+    if (readable) take_models_from_files(document, folder, models);
     for (const std::string& option : overrides) {
         if (!sets_model_files(option)) document.set(option, &describe);
     }
@@ -241,6 +237,40 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
         throw_problem(label, error.what(), {});
     }
     return scene;
+}
+
+}  // namespace
+
+struct SceneSource::Texts {
+    std::string scene, label;
+    std::filesystem::path folder;
+    std::mutex mutex;
+    ModelTexts models;
+};
+
+SceneSource::SceneSource(const std::filesystem::path& path)
+    : SceneSource(read_text_file(path, kMaxSceneBytes), path.string(), folder_of(path)) {}
+
+SceneSource::SceneSource(std::string text, std::string label, std::filesystem::path folder)
+    : texts_(std::make_shared<Texts>()) {
+    texts_->scene = std::move(text);
+    texts_->label = std::move(label);
+    texts_->folder = std::move(folder);
+}
+
+Scene SceneSource::read(std::span<const std::string> overrides, SceneUse use) const {
+    const std::scoped_lock lock(texts_->mutex);
+    return scene_of_text(texts_->scene, texts_->label, texts_->folder, overrides, use, texts_->models);
+}
+
+Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides, SceneUse use) {
+    return SceneSource(path).read(overrides, use);
+}
+
+Scene read_scene_text(std::string_view text, const std::string& label, const std::filesystem::path& folder,
+                      std::span<const std::string> overrides, SceneUse use) {
+    ModelTexts models;
+    return scene_of_text(text, label, folder, overrides, use, models);
 }
 
 }  // namespace nephos

@@ -4,6 +4,7 @@
 // Reads a scene file. One pass finds all problems of the file and of the options and throws them together.
 
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,5 +33,22 @@ Scene read_scene(const std::filesystem::path& path, std::span<const std::string>
 Scene read_scene_text(std::string_view text, const std::string& label,
                       const std::filesystem::path& folder = {}, std::span<const std::string> overrides = {},
                       SceneUse use = SceneUse::everything);
+
+// The text of a scene, and those of the files with base models that it names, each read once: whoever reads the scene more
+// often, with other overrides, has the same one, whatever is done to the files meanwhile. Copies share the texts.
+// Thread-safe.
+class SceneSource {
+  public:
+    // Reads the file. Throws Error(io).
+    explicit SceneSource(const std::filesystem::path& path);
+    SceneSource(std::string text, std::string label, std::filesystem::path folder);
+
+    // As read_scene() and read_scene_text().
+    Scene read(std::span<const std::string> overrides = {}, SceneUse use = SceneUse::everything) const;
+
+  private:
+    struct Texts;
+    std::shared_ptr<Texts> texts_;
+};
 
 }  // namespace nephos

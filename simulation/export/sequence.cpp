@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -30,12 +29,6 @@ std::pair<std::string, std::optional<int>> split_name(const std::filesystem::pat
     std::string name = stem.substr(0, stem.size() - digits.size());
     while (!name.empty() && (name.back() == '_' || name.back() == '.' || name.back() == '-')) name.pop_back();
     return {name.empty() ? "volume" : name, number};
-}
-
-FileStamp stamp_of(const std::filesystem::path& file) {
-    struct stat found {};
-    if (::stat(file.c_str(), &found) != 0) return {};
-    return {found.st_size, found.st_mtim.tv_sec, found.st_mtim.tv_nsec, found.st_ino};
 }
 
 std::vector<WindTable> wind_of(const Scene& scene, std::optional<std::size_t> layer,
@@ -87,7 +80,7 @@ ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& r
         if (!is_wanted(options, frame.number, 1)) continue;
         const std::filesystem::path file = density_file(run, frame, layer);
         s.frames.push_back({file, frame.number, frame.time_s, utc_at(run.scene.georeference, frame.time_s),
-                            stamp_of(file), listed_digest(run, frame, file), is_plain});
+                            file_stamp(file), listed_digest(run, frame, file), is_plain});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, run.folder.string() + ": has no frame of this range");
     read_first(options, s);
@@ -113,7 +106,7 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
             throw Error(ErrorCode::usage,
                         file.string() + ": its number does not follow that of the file before");
         next = number + 1;
-        if (is_wanted(options, number, least)) s.frames.push_back({file, number, 0, {}, stamp_of(file), {}});
+        if (is_wanted(options, number, least)) s.frames.push_back({file, number, 0, {}, file_stamp(file), {}});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, "no file has a number of this range");
     read_first(options, s);
@@ -319,7 +312,7 @@ std::vector<ExportFormat> all_formats(const ExportOptions& options) {
 }
 
 void require_unchanged(const SourceFrame& frame) {
-    if (stamp_of(frame.file) == frame.stamp) return;
+    if (file_stamp(frame.file) == frame.stamp) return;
     throw Error(ErrorCode::io, frame.file.string() + ": was changed while it was exported: export it again");
 }
 

@@ -12,17 +12,11 @@
 #include <vector>
 
 #include "core/digest.h"
+#include "core/file_stamp.h"
 #include "density/vdb/vdb_file.h"
 #include "simulation/export/export.h"
 
 namespace nephos {
-
-// What changes with the content of a file: bytes, time of the last change, number of the inode.
-struct FileStamp {
-    std::int64_t bytes = -1, changed_s = 0, changed_ns = 0;
-    std::uint64_t inode = 0;
-    bool operator==(const FileStamp&) const = default;
-};
 
 struct SourceFrame {
     std::filesystem::path file;

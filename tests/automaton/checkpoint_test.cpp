@@ -196,6 +196,39 @@ TEST(AtomicFile, RefusesALinkOfAnotherUser) {
     EXPECT_TRUE(fs::is_symlink(folder / "link"));
 }
 
+// A link of our own may lead to one of theirs.
+TEST(AtomicFile, FollowsAChainOfLinksAsFarAsTheyAreItsOwn) {
+    const TemporaryFolder folder;
+    fs::create_directory(folder / "far");
+    fs::create_symlink("far/next", folder / "link");
+    fs::create_symlink("../file", folder / "far/next");
+    write_atomically(folder / "link", "new");  // where there was no file
+    EXPECT_TRUE(fs::is_symlink(folder / "link") && fs::is_symlink(folder / "far/next"));
+    EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(folder / "file")));
+    fs::create_symlink("circle", folder / "circle");
+    EXPECT_THROW(write_atomically(folder / "circle", "new"), Error);
+    constexpr uid_t kSomebody = 12345;
+    if (::lchown((folder / "far/next").c_str(), kSomebody, gid_t(-1)) != 0)
+        GTEST_SKIP() << "only root can make a link of another user";
+    EXPECT_THROW(write_atomically(folder / "link", "newer"), Error);
+    std::ifstream in(folder / "file");
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "new");
+}
+
+TEST(AtomicFile, KeepsThePermissionsOfTheFileThatItReplaces) {
+    const TemporaryFolder folder;
+    const auto permissions = [&](const char* name) { return fs::status(folder / name).permissions(); };
+    for (const fs::perms mode : {fs::perms(0600), fs::perms(0644), fs::perms(0444), fs::perms(0755)}) {
+        write_atomically(folder / "file", "old");
+        fs::permissions(folder / "file", mode);
+        write_atomically(folder / "file", "new");
+        EXPECT_EQ(permissions("file"), mode);
+        fs::remove(folder / "file");
+    }
+    write_atomically(folder / "private", "new", Access::owner);
+    EXPECT_EQ(permissions("private"), fs::perms(0600));
+}
+
 // Others who may write into the folder see the name of the temporary file once it is there: a link that they put in
 // its place is neither published nor, by the next file, written through.
 TEST(AtomicFile, RefusesALinkInThePlaceOfItsTemporaryFile) {

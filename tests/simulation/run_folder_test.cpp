@@ -230,6 +230,33 @@ TEST_F(RunFolderTest, ResumingStatisticsStartsGoesOnAndSkips) {
         << "the key that differs";
 }
 
+// What was read for the bits, for the pictures and for the manifest is of one content, or there is no run.
+TEST_F(RunFolderTest, RefusesFilesThatChangeWhileItBegins) {
+    const fs::path map = settings("maps").folder.parent_path() / "heights.raw";
+    std::ofstream(map) << std::string(64, 'a');
+    Scene scene = settings("out").scene;
+    scene.render.terrain.height_map = map;
+    RunSettings s = run_settings(scene, "small.toml");
+    s.folder = settings("out").folder;
+    s.render = false;
+    std::ofstream(map) << std::string(64, 'b');
+    EXPECT_NE(error_of(s, ErrorCode::io).find("heights.raw: was changed while the run began"), std::string::npos);
+    EXPECT_FALSE(fs::exists(s.folder / "statistics.csv"));
+}
+
+// A complete run is left as it is.
+TEST_F(RunFolderTest, ResumingACompleteRunWritesNothing) {
+    RunSettings s = settings("out");
+    ASSERT_TRUE(run_scene(s, {}).complete);
+    const auto written = [&](const char* name) { return fs::last_write_time(s.folder / name); };
+    const auto manifest = written("manifest.json"), checkpoint = written("checkpoint.nephos");
+    s.resume = true;
+    const RunReport report = run_scene(s, {});
+    EXPECT_TRUE(report.complete && report.skipped);
+    EXPECT_EQ(written("manifest.json"), manifest);
+    EXPECT_EQ(written("checkpoint.nephos"), checkpoint);
+}
+
 TEST_F(RunFolderTest, RefusesToResumeWhenResultsAreGone) {
     RunSettings s = settings("out");
     ASSERT_FALSE(run_scene(s, stop_after(12)).complete);

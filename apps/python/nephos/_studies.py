@@ -15,6 +15,7 @@ import numpy
 
 from ._nephos import Error, Scene, _toml_text
 
+_FILE_KEYS = ("initial_state", "files", "file", "textures", "height_map")
 _WORDS = ("run", "status", "regime", "state_hash", "message", "command")
 
 
@@ -43,8 +44,11 @@ def _call(arguments, allowed=(0,), plan=None):
                                text=True, errors="backslashreplace")
     try:
         message = process.communicate()[1].strip()
-    except KeyboardInterrupt:
-        process.wait()  # Ctrl-C reached it too; it keeps what is done
+    except BaseException as error:
+        # Ctrl-C reached it too; it keeps what is done, and its arguments must stay until it has ended.
+        if not isinstance(error, KeyboardInterrupt):
+            process.terminate()
+        process.communicate()
         raise
     if process.returncode not in allowed:
         code = {1: "check", 2: "usage", 3: "io", 4: "gpu"}.get(process.returncode, "io")
@@ -124,6 +128,19 @@ class Sweep:
         return f"<nephos.Sweep in {str(self.folder)!r}>"
 
 
+def _folder(path):
+    path = os.fsdecode(path)
+    if not path:
+        raise _error("the folder `out` has no name", "usage")
+    return path
+
+
+def _placed(keys, values):
+    """Names of files are seen from the current folder, and not from that of the plan, which is temporary."""
+    names_file = any(re.sub(r"(\[\d*\])?\s*$", "", key.rsplit(".", 1)[-1]) in _FILE_KEYS for key in keys)
+    return [os.path.abspath(value) if names_file and isinstance(value, (str, os.PathLike)) else value for value in values]
+
+
 def _plan(axes, options):
     lines = [f"{key} = {_toml_text(value)}" for key, value in options.items() if value is not None]
     for key, values in axes.items():
@@ -137,7 +154,7 @@ def _plan(axes, options):
             entries = ", ".join(f"{entry} = {_toml_text(value)}" for entry, value in values.items())
             text = "{ " + entries + " }"
         else:
-            text = _toml_text(values)
+            text = _toml_text(_placed(keys, values))
         lines += ["", "[[axis]]", f"keys = {_toml_text(keys)}", f"{name} = {text}"]
     return "\n".join(lines) + "\n"
 
@@ -149,7 +166,7 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
 
     scene     a Scene, or the path of one
     axes      {key: values}: a list of values; {"from": a, "to": b, "count": n, "scale": "log"} spread between two; without
-              "count" the range of a sampled design. A tuple of keys moves them together
+              "count" the range of a sampled design. A tuple of keys moves them together. A value may be the name of a file
     out       folder of the sweep; the same call again, or one with longer axes, runs only what is missing
     steps     (least, most): a run goes on, up to the most, until it is judged steady
     design    "grid", "list", "random", "latin_hypercube" or "sobol"; the last three take `points`
@@ -162,6 +179,7 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
 
     Raises Error before the first run where a value is out of range, with the text of the command. Runs that fail are in
     failures(), and do not raise. Ctrl-C stops, and what is done stays."""
+    out = _folder(out)
     options = {"scene": "scene.toml", "design": design, "points": points, "replicates": replicates, "seed": seed,
                "seeds": seeds, "clouds_every": clouds_every, "tracks": tracks or None, "layer": layer}
     rules = {"min": steps[0], "max": steps[1]}
@@ -190,7 +208,7 @@ def merge(folders, out=None, *, overwrite=False):
     folder by default. Runs that are missing yet stand in runs.csv as missing. Raises Error where that would lose runs of earlier
     tables, unless `overwrite`."""
     folders = [folders] if isinstance(folders, (str, os.PathLike)) else list(folders)
-    out = folders[0] if out is None else out
+    out = _folder(folders[0] if out is None else out)
     _call(["merge", *folders, "--out", out, "--quiet", *_flags(False, overwrite)])
     sweep = Sweep(out)
     sweep._records = folders
@@ -202,6 +220,7 @@ def fit(path, out, *, workers=None, retry_failed=False, overwrite=False):
     added: a dict of arrays, 1,000 equally likely values of each key. The same call again runs only what is missing;
     `retry_failed` runs again what failed, `overwrite` throws the records of an earlier fit away first. Raises Error with the
     text of the command."""
+    out = _folder(out)
     jobs = [] if workers is None else ["--workers", workers]
     _call(["fit", path, "--out", out, "--quiet", *jobs, *_flags(retry_failed, overwrite)])
     result = json.loads(pathlib.Path(out, "fit.json").read_text(encoding="utf-8"))

@@ -243,6 +243,21 @@ class Branch(Case):
         (self.folder / "copy/checkpoint.nephos").unlink()
         self.refused(2, "run", "--no-render", "--out", "copy", "--resume", says="left no checkpoint of its own")
 
+    def test_frames_of_other_times(self):
+        """Numbers go on from those of the other run; where that would leave out frames, or ask for some before the branch."""
+        scene = self.write("tiny.toml", LONG.replace("steps = 10000", "steps = 20"))
+        frames = ("--set", "frames.time_scale=10", "--set")  # 10 s each
+        self.call("run", scene, "--no-render", *frames, "frames.count=5", "--set", "frames.start_s=50", "--out", "source")
+        branch = ("run", "--from", "source", "--no-render", "--set", "time.steps=60", "--set")
+        for more, says in ((("frames.start_s=300", "--set", "frames.count=3"), "frame 3 of the scene, at 320 s, is after"),
+                           (("frames.start_s=250", "--set", "frames.count=30"), "frame 5 of the scene, at 290 s, is after"),
+                           (("frames.start_s=100", "--set", "frames.count=30"), "frame 6 of the scene, at 150 s, is before")):
+            self.refused(2, *branch, *more, "--out", "no", says=says)
+            self.assertFalse((self.folder / "no").exists())
+        self.call(*branch, "frames.start_s=160", "--set", "frames.count=8", "--out", "good")
+        self.assertEqual(sorted(path.name for path in (self.folder / "good/density").iterdir()),
+                         [f"tiny_{n:04}.vdb" for n in (6, 7, 8)])
+
     def test_a_run_goes_on_with_its_own_scene(self):
         self.call("run", self.scene, "--no-render", "--out", "whole")
         self.call("run", self.scene, "--no-render", "--out", "part", "--set", "time.steps=3")

@@ -406,6 +406,77 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
         self.assertIn(f"{data.resolve()}/c.vdb: No such file", missing.stderr)
         self.assertFalse((self.folder / "no").exists())
 
+    def meanwhile(self, out, act, *sweep):
+        """Begins a sweep, calls `act` when its first records are there, and returns its status and what it said."""
+        process = subprocess.Popen([NEPHOS, "sweep", *map(str, sweep), "--out", out, "-j", "1", "--quiet"], cwd=self.folder,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.environment)
+        end = time.monotonic() + 60
+        while not any(path.stat().st_size > 1000 for path in (self.folder / out).glob("shards/*")):
+            self.assertLess(time.monotonic(), end)
+            self.assertIsNone(process.poll())
+            time.sleep(0.005)
+        act()
+        _, errors = process.communicate(timeout=120)
+        return process.returncode, errors
+
+    def test_a_scene_that_is_edited_meanwhile(self):
+        """The runs are those of the scene that the sweep began with, and so are the waves of a fit."""
+        scene = pathlib.Path(self.write("scenes/edited.toml", NULL))
+        sweep = (scene, "--axis", "field.background.ext=0.1..0.4:8", "--replicates", "4", "--steps", "1500..1500")
+        self.call("sweep", *sweep, "--out", "calm")
+        status, errors = self.meanwhile("edited", lambda: scene.write_text(NULL.replace("act = 0.002", "act = 0.02")), *sweep)
+        self.assertEqual((status, errors), (0, ""))
+        self.assertEqual(self.tables("edited"), self.tables("calm"))
+        # What it is now is another sweep.
+        self.assertIn('"before": 0', self.call("sweep", *sweep, "--out", "edited", "--json").stdout)
+
+    def test_a_file_that_is_exchanged_meanwhile(self):
+        for name, hum in (("a.vdb", 0.1), ("b.vdb", 0.9)):
+            self.call("state", self.null, "--steps", "1", "--set", f"field.background.hum={hum}", "--out", name)
+        data = self.folder / "data.vdb"
+        shutil.copy(self.folder / "a.vdb", data)
+        scene = self.write("started.toml", NULL.replace('initial = "empty"', 'initial_state = "data.vdb"'))
+        sweep = (scene, "--axis", "field.background.ext=0.1..0.4:8", "--replicates", "4", "--steps", "1500..1500")
+        self.call("sweep", *sweep, "--out", "calm")
+        status, errors = self.meanwhile("exchanged", lambda: os.replace(self.folder / "b.vdb", data), *sweep)
+        self.assertEqual(status, 3)
+        self.assertIn("data.vdb: was changed after the sweep began", errors)
+        shutil.copy(self.folder / "a.vdb", data)
+        result = json.loads(self.call("sweep", *sweep, "--out", "exchanged", "--json").stdout)
+        self.assertEqual((result["done"], result["failed"]), (32, 0))
+        self.assertGreater(result["before"], 0)
+        self.assertEqual(self.tables("exchanged"), self.tables("calm"))
+
+    def test_files_of_others_are_not_replaced(self):
+        """Scenes, plans and tables of the user's own, and runs."""
+        axis = ("--axis", "field.background.ext=0.1,0.2", "--replicates", "1", "--steps", "20", "--out")
+        text = "# mine\n" + NULL
+        scene = pathlib.Path(self.write("own/scene.toml", text))
+        self.refused(2, "sweep", "--quiet", scene, *axis, "own", says="own/scene.toml: is there, but a sweep did not write it")
+        plan_text = ('# mine\nscene = "scene.toml"\nreplicates = 1\n[[axis]]\nkey = "field.background.ext"\nvalues = [0.1]\n'
+                     "[steps]\nmin = 20\nmax = 20\n")
+        plan = pathlib.Path(self.write("own/sweep.toml", plan_text))
+        for more in ((), ("--emit", "slurm"), ("--overwrite",), ("--shard", "0/2")):
+            self.refused(2, "sweep", "--quiet", plan, "--out", "own", *more, says="a sweep did not write it")
+        self.assertEqual((scene.read_text(), plan.read_text()), (text, plan_text))
+        self.assertFalse((self.folder / "own/shards").exists())
+        self.call("run", self.null, "--no-render", "--set", "time.steps=2", "--out", "run")
+        manifest = (self.folder / "run/manifest.json").read_bytes()
+        self.refused(2, "sweep", "--quiet", self.null, *axis, "run", says="run/manifest.json: is there")
+        self.call("sweep", self.null, *axis, "swept")
+        self.refused(2, "merge", "swept", "--out", "run", says="run/manifest.json: is there")
+        self.assertEqual((self.folder / "run/manifest.json").read_bytes(), manifest)
+        for name in ("runs.csv", "points.csv", "failures.csv", "tracks.csv", "series.nc"):
+            self.write(f"tables-{name}/{name}", "mine")
+            self.refused(2, "sweep", "--quiet", self.null, *axis, f"tables-{name}", says=f"{name}: is there")
+        # What a sweep left is its own: with and without records, and a plan that was made only.
+        self.call("merge", "swept", "--out", "tables")
+        for folder in ("swept", "tables"):
+            self.call("sweep", self.null, *axis, folder)
+        self.call("sweep", self.null, *axis, "planned", "--emit", "slurm")
+        shutil.rmtree(self.folder / "planned/shards")
+        self.call("sweep", self.null, *axis, "planned")
+
     def test_a_grown_axis_computes_only_what_is_new(self):
         self.sweep("grown", "-j", "2", axis="field.background.ext=0.2,0.05")
         result = self.sweep("grown", "-j", "2", "--json")

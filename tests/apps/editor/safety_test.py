@@ -334,6 +334,7 @@ class Safety(Case):
     def test_a_signal_keeps_the_edits(self):
         """An end of the session: the program ends by SIGTERM within a moment, and unsaved edits are beside the scene."""
         scene = self.models()
+        scene.chmod(0o600)
         ready = self.folder / "ready.txt"
         program = subprocess.Popen(self.command(scene, script="""
             wait-step 1
@@ -347,7 +348,9 @@ class Safety(Case):
         os.kill(editor, signal.SIGTERM)
         program.communicate(timeout=30)
         self.assertEqual(program.returncode, 128 + signal.SIGTERM)
-        self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
+        autosave = self.folder / ".models.toml.autosave"
+        self.assertIn("elevation_deg = 21", autosave.read_text(encoding="utf-8"))
+        self.assertEqual(autosave.stat().st_mode & 0o777, 0o600)  # as private as the scene may be
         self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
 
     def is_our_editor(self, pid, script="script.txt"):
@@ -461,6 +464,29 @@ class Layout(Case):
             screenshot again.png
             """)
         self.assertEqual(self.image("again.png").size, (1100, 720))
+
+    def test_small_text(self):
+        """Smaller than normal: asked for, from the menu, of a display with large dots; and settings that no editor wrote."""
+        scene = self.scene("cumulus-by-hand.toml")
+        look = """
+            wait-step 1
+            click menu View
+            wait 0.3
+            click "menu Size of text"
+            wait 0.3
+            click "menu 80 %"
+            wait 0.5
+            """
+        self.edit(scene, "--scale", "0.5", script=look)
+        self.edit(scene, script=look)
+        self.edit(scene, script=look, server=("-dpi", "48"))
+        settings = self.folder / "config/nephos/editor.conf"
+        self.assertIn("scale = 0.8", settings.read_text(encoding="utf-8"))
+        settings.write_text("scale = 0.001\n", encoding="utf-8")
+        self.edit(scene, script="wait-step 1")
+        settings.unlink()
+        os.mkfifo(settings)
+        self.edit(scene, script="wait-step 1")
 
     def test_small_dots(self):
         """At 192 dots an inch window, text and panels are twice as large as at 96, and the picture has all the dots."""

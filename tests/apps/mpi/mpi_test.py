@@ -53,6 +53,46 @@ class Mpi(Case):
             self.assertIn(option, self.mpirun(1, scene, option, "-5", "--hash", status=2).stderr)
 
 
+    def test_numbers_are_those_of_the_command(self):
+        scene = self.write("s.toml", SCENE.format(boundaries='"periodic"', wind=""))
+        for option, number in (("--seed", 2**64), ("--seed", "0x10"), ("--steps", 10**20), ("--steps", 10**9 + 1), ("--steps", "1.5")):
+            self.assertIn(f"'{number}' is not a whole number", self.mpirun(1, scene, option, number, "--hash", status=2).stderr)
+
+    def test_hashes_that_cannot_be_printed(self):
+        scene = self.write("s.toml", SCENE.format(boundaries='"periodic"', wind=""))
+        with open("/dev/full", "w") as full:
+            result = subprocess.run([PROGRAM, scene, "--steps", "1", "--hash"], stdout=full, stderr=subprocess.PIPE, text=True,
+                                    env=self.environment, timeout=60)
+        self.assertIn("standard output: cannot write", result.stderr)
+        self.assertEqual(result.returncode, 3)
+
+    def test_what_is_in_the_folder_stays(self):
+        """A run, a table of an earlier call, links and pipes."""
+        scene = self.write("s.toml", SCENE.format(boundaries='"periodic"', wind=""))
+        self.call("run", scene, "--no-render", "--set", "time.steps=3", "--out", "run")
+        table = (self.folder / "run/statistics.csv").read_bytes()
+        for more in ((), ("--overwrite",)):
+            self.assertIn("holds a run", self.mpirun(1, scene, "--out", "run", *more, status=2).stderr)
+        self.assertEqual((self.folder / "run/statistics.csv").read_bytes(), table)
+        levels = ("--steps", "2", "--write-state", "--slab-levels")
+        self.mpirun(2, scene, "--out", "mpi", *levels, 8)
+        before = (self.folder / "mpi/statistics.csv").read_bytes()
+        self.assertIn("is there already", self.mpirun(2, scene, "--out", "mpi", *levels, 32, status=2).stderr)
+        self.assertEqual((self.folder / "mpi/statistics.csv").read_bytes(), before)
+        self.mpirun(2, scene, "--out", "mpi", *levels, 32, "--overwrite")
+        self.assertEqual(len(list((self.folder / "mpi").glob("levels_*.vdb"))), 2)
+        victim = pathlib.Path(self.write("victim", "precious"))
+        for name in ("link", "pipe"):
+            (self.folder / name).mkdir()
+        (self.folder / "link/statistics.csv").symlink_to(victim)
+        os.mkfifo(self.folder / "pipe/statistics.csv")
+        for name in ("link", "pipe"):
+            self.mpirun(1, scene, "--steps", "1", "--out", name, status=2)
+            self.mpirun(1, scene, "--steps", "1", "--out", name, "--overwrite")
+        self.assertEqual(victim.read_text(), "precious")
+        self.mpirun(1, scene, "--out", "", status=2)
+
+
 class Ranks(Mpi):
     def test_hashes_are_those_of_one_process(self):
         """Each number of processes x open, periodic and mixed sides x calm and wind: a hundred steps."""

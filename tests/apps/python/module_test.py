@@ -445,6 +445,27 @@ class Threads(Case):
         self.assertTrue(0 < steps < 10**9)
         self.assertEqual(simulation.step().step_number, steps + 1)
 
+    def test_an_exception_ends_a_sweep(self):
+        """Whatever a handler raises: no process stays that works without its arguments, and the same call goes on."""
+        def stop(*_):
+            raise TimeoutError
+
+        def sweep():
+            return nephos.sweep(nephos.Scene(self.scene), {"field.background.ext": [0.1, 0.2]}, self.folder / "out", replicates=4,
+                                steps=(2000, 2000), clouds_every=0, workers=1)
+
+        before = signal.signal(signal.SIGALRM, stop)
+        try:
+            signal.setitimer(signal.ITIMER_REAL, 0.3)
+            with self.assertRaises(TimeoutError):
+                sweep()
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, before)
+        self.assertFalse(os.path.exists(f"/proc/{os.getpid()}/task/{os.getpid()}/children") and
+                         pathlib.Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().strip())
+        self.assertEqual(list(sweep().runs()["status"]), ["done"] * 8)
+
     def test_a_program_ends_while_its_daemons_work(self):
         # Python takes the interpreter from them where they come back from the engine.
         program = ("import nephos, threading, time\n"

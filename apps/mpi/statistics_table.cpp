@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/mpi/statistics_table.h"
+
+#include <cmath>
+#include <cstring>
+#include <span>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The text of a number, nothing where there is none.
+std::string field(double value) { return std::isfinite(value) ? number_text(value) : std::string(); }
+
+// Returns what an earlier call has left: the table, and levels of a state.
+std::vector<fs::path> earlier_files(const fs::path& folder) {
+    std::vector<fs::path> files;
+    std::error_code error;
+    for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+        const std::string name = at->path().filename().string();
+        const bool is_levels = name.starts_with("levels_") && name.ends_with(".vdb");
+        if (is_levels || name == "statistics.csv") files.push_back(at->path());
+    }
+    if (error) throw Error(ErrorCode::io, folder.string() + ": cannot read the folder: " + error.message());
+    return files;
+}
+
+// Returns the place of the table, where nothing stands any more.
+fs::path cleared(const fs::path& folder, bool overwrite) {
+    std::error_code error;
+    if (fs::exists(fs::symlink_status(folder / "manifest.json", error)))
+        throw Error(ErrorCode::usage, folder.string() + ": holds a run or a sweep (manifest.json): give another folder");
+    const std::vector<fs::path> files = earlier_files(folder);
+    if (!files.empty() && !overwrite)
+        throw Error(ErrorCode::usage, files.front().string() + ": is there already: give --overwrite, or another folder");
+    for (const fs::path& file : files)
+        if (!fs::remove(file, error) && error)
+            throw Error(ErrorCode::io, file.string() + ": cannot remove: " + error.message());
+    return folder / "statistics.csv";
+}
+
+}  // namespace
+
+StatisticsTable::StatisticsTable(const fs::path& folder, bool overwrite)
+    : lock_(folder, "run") {
+    path_ = cleared(folder, overwrite);
+    file_ = open_regular_file(path_, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW);
+    write("step,time_s,hum,act,cld,cloud_cover,base_m,top_m,base_mean_m,top_mean_m,perimeter_m,hash\n");
+}
+
+void StatisticsTable::add(std::uint64_t step, double time_s, const CloudStatistics& s, const std::string& hash) {
+    lock_.require_in_place();
+    write(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", step, number_text(time_s), s.hum, s.act, s.cld,
+                      field(s.cover), field(s.base_m), field(s.top_m), field(s.base_mean_m), field(s.top_mean_m),
+                      field(s.perimeter_m), hash));
+}
+
+void StatisticsTable::write(const std::string& text) {
+    if (const int error = write_all(file_.get(), std::as_bytes(std::span(text))))
+        throw Error(ErrorCode::io, path_.string() + ": cannot write: " + std::strerror(error));
+}
+
+}  // namespace nephos

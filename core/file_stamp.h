@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Tells whether a file was written, exchanged or removed between two looks at it, without reading it.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+
+namespace nephos {
+
+// Two that are equal are of one file that nobody has written to in between; as fine as the clock of the file system, some
+// milliseconds. All 0: there is no file that can be examined.
+struct FileStamp {
+    std::uint64_t device = 0, inode = 0, bytes = 0;
+    std::int64_t written_ns = 0, changed_ns = 0;  // mtime, and ctime, which no program can set
+    bool operator==(const FileStamp&) const = default;
+};
+
+// Follows links. Thread-safe.
+FileStamp file_stamp(const std::filesystem::path& path) noexcept;
+
+using FileStamps = std::map<std::filesystem::path, FileStamp>;
+
+// Returns the first of the files that has another stamp now.
+std::optional<std::filesystem::path> first_changed(const FileStamps& stamps);
+
+}  // namespace nephos
