@@ -57,7 +57,8 @@ std::filesystem::path target_of(const std::filesystem::path& path) {
         if (links == kMostLinks) fail(path, "cannot follow the link", ELOOP);
         if (!is_trusted_link(target)) {
             const std::string link = links == 0 ? "" : "leads to " + target.string() + ", which ";
-            throw Error(ErrorCode::io, path.string() + ": " + link + "is a link of another user, which is not followed");
+            throw Error(ErrorCode::io,
+                        path.string() + ": " + link + "is a link of another user, which is not followed");
         }
         const std::filesystem::path next = std::filesystem::read_symlink(target, error);
         if (error) fail(path, "cannot follow the link", error.value());
@@ -113,20 +114,30 @@ AtomicFile::AtomicFile(const std::filesystem::path& given, Access access) : path
     std::filesystem::create_directories(folder, error);
     if (error) fail(folder, "cannot create the folder", error.value());
     create_temporary(folder, access);
-    take_permissions();
 }
 
-// Before there is content that others might read. Where the system refuses, the new file is as any other.
-void AtomicFile::take_permissions() {
-    struct stat before {};
-    if (::stat(path_.c_str(), &before) != 0) return;
-    const Descriptor descriptor(::open(temporary_.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
-    if (descriptor.get() < 0) return;
-    if (::geteuid() == 0) {
-        [[maybe_unused]] const int ignored = ::fchown(descriptor.get(), before.st_uid, before.st_gid);
+// Takes over owner, group and permissions of the file that is replaced, before there is content that others might read. What
+// another user put there says nothing, but for root in a folder that nobody else may write to. Throws Error(io) where the new
+// file would be open to more.
+void AtomicFile::take_permissions(int fd, const std::filesystem::path& folder) {
+    struct stat before {
+    }, parent{}, now{};
+    if (::stat(path_.c_str(), &before) != 0 || !S_ISREG(before.st_mode)) return;
+    if (before.st_uid != ::geteuid()) {
+        constexpr mode_t kOthersWrite = S_IWGRP | S_IWOTH;
+        const bool is_sound =
+            ::geteuid() == 0 && ::stat(folder.c_str(), &parent) == 0 && (parent.st_mode & kOthersWrite) == 0;
+        if (!is_sound || ::fchown(fd, before.st_uid, gid_t(-1)) != 0) return;
     }
-    permissions_ = before.st_mode & kPermissions;
-    [[maybe_unused]] const int ignored = ::fchmod(descriptor.get(), *permissions_ | S_IRUSR | S_IWUSR);
+    mode_t permissions = before.st_mode & kPermissions;
+    // Rights of a group are of that group alone.
+    if (::fchown(fd, uid_t(-1), before.st_gid) != 0) permissions &= ~mode_t(S_IRWXG);
+    const mode_t kept = permissions | S_IRUSR | S_IWUSR;  // until it is complete
+    if (::fchmod(fd, kept) == 0) {
+        permissions_ = permissions;
+    } else if (::fstat(fd, &now) != 0 || (now.st_mode & kPermissions & ~kept) != 0) {
+        throw Error(ErrorCode::io, path_.string() + ": cannot be replaced by a file that is as private");
+    }
 }
 
 // A name of this process' number and 64 random bits, and O_EXCL: in a folder that others may write to, a file or link
@@ -151,6 +162,12 @@ void AtomicFile::create_temporary(const std::filesystem::path& folder, Access ac
         }
         device_ = status.st_dev;
         inode_ = status.st_ino;
+        try {
+            if (access == Access::shared) take_permissions(descriptor.get(), folder);
+        } catch (const Error&) {
+            ::unlink(temporary_.c_str());
+            throw;
+        }
         return;
     }
 }
@@ -175,9 +192,9 @@ void AtomicFile::publish() {
     flush_to_device(temporary_, path_, O_RDONLY | O_NOFOLLOW);
     if (permissions_ && *permissions_ != (status.st_mode & kPermissions)) {
         const Descriptor descriptor(::open(temporary_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
-        if (::fstat(descriptor.get(), &status) == 0 && is_created_file(status)) {
-            [[maybe_unused]] const int ignored = ::fchmod(descriptor.get(), *permissions_);
-        }
+        if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0 || !is_created_file(status) ||
+            ::fchmod(descriptor.get(), *permissions_) != 0)
+            fail(path_, "cannot set its permissions", errno);
     }
     std::error_code error;
     std::filesystem::rename(temporary_, path_, error);
@@ -194,8 +211,8 @@ void write_atomically(const std::filesystem::path& path,
 }
 
 void write_pieces_atomically(const std::filesystem::path& path,
-                             const std::function<void(const AppendPiece& append)>& fill, Access access) {
-    AtomicFile file(path, access);
+                             const std::function<void(const AppendPiece& append)>& fill) {
+    AtomicFile file(path);
     Descriptor descriptor(::open(file.temporary().c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC));
     if (descriptor.get() < 0) fail(path, "cannot open", errno);
     PieceWriter writer(descriptor.get());
@@ -208,8 +225,8 @@ void write_pieces_atomically(const std::filesystem::path& path,
     file.publish();
 }
 
-void write_atomically(const std::filesystem::path& path, std::string_view content, Access access) {
-    write_pieces_atomically(path, [&](const AppendPiece& append) { append(content); }, access);
+void write_atomically(const std::filesystem::path& path, std::string_view content) {
+    write_pieces_atomically(path, [&](const AppendPiece& append) { append(content); });
 }
 
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> content) {

@@ -17,9 +17,9 @@
 
 namespace nephos {
 
-// Who may read a file that was not there before; one that is replaced keeps its permissions, and for root its owner.
+// Who may read and write the new file.
 enum class Access {
-    shared,  // as the umask has it
+    shared,  // whoever might the one that it replaces, if that is of this user; otherwise as the umask has it
     owner,   // this user alone
 };
 
@@ -44,7 +44,7 @@ class AtomicFile {
 
   private:
     void create_temporary(const std::filesystem::path& folder, Access access);
-    void take_permissions();
+    void take_permissions(int fd, const std::filesystem::path& folder);
     bool is_created_file(const struct stat& status) const;
 
     std::filesystem::path path_, temporary_;
@@ -61,13 +61,13 @@ void write_atomically(const std::filesystem::path& path,
 
 // Writes content that is in memory; errors as above.
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
-void write_atomically(const std::filesystem::path& path, std::string_view content, Access access = Access::shared);
+void write_atomically(const std::filesystem::path& path, std::string_view content);
 
 // Writes content that is never in memory as a whole: `fill` calls `append` with one piece after the other.
 // Errors as above.
 using AppendPiece = std::function<void(std::string_view piece)>;
 void write_pieces_atomically(const std::filesystem::path& path,
-                             const std::function<void(const AppendPiece& append)>& fill, Access access = Access::shared);
+                             const std::function<void(const AppendPiece& append)>& fill);
 
 // Returns the final name of a temporary file of the functions above ("cloud.vdb" for
 // ".cloud.part123-456.vdb"), or "" for any other name. A killed process leaves such files behind.

@@ -14,7 +14,7 @@ namespace nephos {
 // milliseconds. All 0: there is no file that can be examined.
 struct FileStamp {
     std::uint64_t device = 0, inode = 0, bytes = 0;
-    std::int64_t written_ns = 0, changed_ns = 0;  // mtime, and ctime, which no program can set
+    std::int64_t written_ns = 0;  // mtime: a link more or other permissions make no other version
     bool operator==(const FileStamp&) const = default;
 };
 
@@ -23,7 +23,7 @@ FileStamp file_stamp(const std::filesystem::path& path) noexcept;
 
 using FileStamps = std::map<std::filesystem::path, FileStamp>;
 
-// Returns the first of the files that has another stamp now.
+// Returns the first of the files that has another stamp now. Thread-safe.
 std::optional<std::filesystem::path> first_changed(const FileStamps& stamps);
 
 }  // namespace nephos

@@ -94,14 +94,18 @@ void require_frames_after(const RunSettings& settings, std::uint64_t next_step, 
     const auto time_s = [&](int number) { return frame_time_s(scene.frames, number - 1); };
     const double branch_s = double(next_step == 0 ? 0 : next_step - 1) * scene.automaton.time_step_s;
     const auto fail = [&](int number, const char* what) {
-        throw Error(ErrorCode::usage,
-                    fmt::format("{}: its frames go on with number {}, and frame {} of the scene, at {:g} s, is {} the run "
-                                "branches off at, {:g} s: expected `frames.start_s` such that frame {} is the first one from "
-                                "there on",
-                                point.checkpoint.string(), next, number, time_s(number), what, branch_s, next));
+        throw Error(
+            ErrorCode::usage,
+            fmt::format(
+                "{}: its frames go on with number {}, and frame {} of the scene, at {:g} s, is {} the run "
+                "branches off at, {:g} s: expected `frames.start_s` such that frame {} is the first one from "
+                "there on",
+                point.checkpoint.string(), next, number, time_s(number), what, branch_s, next));
     };
-    if (before > 0 && steps_up_to(moment_of_frame(scene, before - 1)) >= next_step) fail(before, "after the moment that");
-    if (next <= last && steps_up_to(moment_of_frame(scene, next - 1)) + 1 < next_step) fail(next, "before the moment that");
+    if (before > 0 && steps_up_to(moment_of_frame(scene, before - 1)) >= next_step)
+        fail(before, "after the moment that");
+    if (next <= last && steps_up_to(moment_of_frame(scene, next - 1)) + 1 < next_step)
+        fail(next, "before the moment that");
 }
 
 }  // namespace
@@ -160,7 +164,6 @@ std::string scene_text_beside(const std::filesystem::path& from) {
 
 Simulation branched_simulation(const RunSettings& settings, const RunFolder& folder) {
     const Checkpoint checkpoint = read_checkpoint(settings.branch->checkpoint);
-    const std::uint64_t steps = saved_point(checkpoint).next_step;
     const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
     std::error_code failed;
     if (std::filesystem::equivalent(parent.folder.empty() ? "." : parent.folder, folder.folder, failed)) {
@@ -168,17 +171,21 @@ Simulation branched_simulation(const RunSettings& settings, const RunFolder& fol
                                           ": is the folder of the run that is branched off: expected another one");
     }
     try {
-        Simulation simulation(settings.scene, settings.range, settings.simulation_hash, checkpoint, settings.results(),
-                              Restart::branch);
-        remove_earlier_run(folder);
-        copy_statistics(parent.statistics(), folder.statistics(), steps, kStatisticsHeader);
-        for (const LayerOptions& layer : settings.scene.layers)
-            copy_statistics(parent.statistics(layer.name), folder.statistics(layer.name), steps, kLayerStatisticsHeader);
-        return simulation;
+        return {settings.scene, settings.range,     settings.simulation_hash,
+                checkpoint,     settings.results(), Restart::branch};
     } catch (const Error& error) {
         if (error.code() != ErrorCode::usage) throw;
         throw Error(ErrorCode::usage, settings.branch->checkpoint.string() + ": " + error.what());
     }
+}
+
+void begin_branch_folder(const RunSettings& settings, const RunFolder& folder, std::uint64_t steps) {
+    const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
+    remove_earlier_run(folder);
+    copy_statistics(parent.statistics(), folder.statistics(), steps, kStatisticsHeader);
+    for (const LayerOptions& layer : settings.scene.layers)
+        copy_statistics(parent.statistics(layer.name), folder.statistics(layer.name), steps,
+                        kLayerStatisticsHeader);
 }
 
 }  // namespace nephos

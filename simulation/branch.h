@@ -34,8 +34,12 @@ bool is_branch_point(const Checkpoint& checkpoint, const BranchPoint& point, con
 // Error(io).
 std::string scene_text_beside(const std::filesystem::path& from);
 
-// Starts a branch in its empty folder: copies the statistics up to the checkpoint, and restores the simulation. Throws
-// Error(usage) when the state does not fit the scene.
+// Restores the simulation of a branch. Throws Error(usage) when the state does not fit the scene, or the folder is that of
+// the other run.
 Simulation branched_simulation(const RunSettings& settings, const RunFolder& folder);
+
+// Begins the folder of a branch: removes an earlier run, and copies the rows of all steps before `steps` from the statistics
+// of the other run. Throws Error(io).
+void begin_branch_folder(const RunSettings& settings, const RunFolder& folder, std::uint64_t steps);
 
 }  // namespace nephos

@@ -115,7 +115,8 @@ FramePainter::Ground FramePainter::ground_of(const Scene& scene) {
 
 FileStamps FramePainter::textures_of(const Scene& scene) {
     FileStamps stamps;
-    for (const TextureFile& texture : texture_files(scene)) stamps.emplace(texture.file, file_stamp(texture.file));
+    for (const TextureFile& texture : texture_files(scene))
+        stamps.emplace(texture.file, file_stamp(texture.file));
     return stamps;
 }
 

@@ -96,7 +96,7 @@ class FramePainter {
     Renderer renderer_;
     SkyPainter painter_;
     Ground ground_;                     // of the painter's height map
-    FileStamps textures_;  // of its textures
+    FileStamps textures_;               // of its textures
 };
 
 // Returns the rain or snow of a frame as the renderer draws it: the curtains of all layers, from the ground of

@@ -13,6 +13,7 @@
 #include "core/math.h"
 #include "core/random.h"
 #include "density/combine.h"
+#include "scenes/format/given_keys.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
 #include "scenes/format/writer.h"
@@ -302,6 +303,7 @@ void write_manifest(const RunSettings& settings, const ManifestState& state) {
         if (!state.run_files.empty()) tail["run_files"] = files_json(state.run_files);
         tail.update(Json{
             {"scene_text", settings.scene_text},
+            {"scene_given", given_toml(settings.scene)},
             {"timing", {{"wall_s", state.wall_s}, {"backend", state.backend}, {"device", state.device}}}});
         append("\n  ],\n" + members(tail) + "\n}\n");
     });
@@ -346,13 +348,20 @@ std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& pa
 }
 
 std::string read_scene_text_of(const std::filesystem::path& path) {
-    const std::string text =
-        with_manifest(path, [](const Json& json) { return json.at("scene_text").get<std::string>(); });
-    const std::vector<RunInput> inputs = read_manifest(path).inputs;
-    if (inputs.empty()) return text;
-    Scene scene = read_scene_text(text, path.string() + ": scene_text", {}, {}, SceneUse::without_frames);
-    locate_inputs(scene, path.parent_path(), inputs);
-    return to_toml(scene);
+    const auto [canonical, given] = with_manifest(path, [](const Json& json) {
+        return std::pair(json.at("scene_text").get<std::string>(), json.value("scene_given", std::string()));
+    });
+    const auto read = [&](const std::string& text, const char* name) {
+        return read_scene_text(text, path.string() + name, {}, {}, SceneUse::without_frames);
+    };
+    Scene scene = read(given.empty() ? canonical : given, given.empty() ? ": scene_text" : ": scene_given");
+    // Earlier versions have no given keys, and a program may have changed more than they show.
+    if (given.empty() || to_toml(scene) != canonical) {
+        scene = read(canonical, ": scene_text");
+        scene.given = {};
+    }
+    locate_inputs(scene, path.parent_path(), read_manifest(path).inputs);
+    return given_toml(scene);
 }
 
 std::map<int, std::vector<FileRecord>> read_frame_files(const std::filesystem::path& path) {

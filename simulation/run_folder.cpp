@@ -400,7 +400,9 @@ bool wants_video(const Scene& scene) { return scene.frames.enabled && scene.fram
 
 RunSettings run_settings(Scene scene, const std::string& scene_file, RunStart from) {
     RunSettings settings;
-    settings.stamps = stamps_of(scene, true);
+    std::vector<FileKind> read{FileKind::simulation, FileKind::picture};
+    if (from == RunStart::first_state) read.push_back(FileKind::first_state);
+    settings.stamps = stamps_of(scene, read);
     scene = with_files(std::move(scene));
     if (from == RunStart::checkpoint) {
         settings.simulation_hash = simulation_hash(scene, hash_of_files(scene));
@@ -447,20 +449,23 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
                                                     std::move(settings.initial), settings.results()));
     // Of the layers, of the pictures and for the checksums files were read at different times.
     if (const auto changed = first_changed(settings.stamps))
-        throw Error(ErrorCode::io, changed->string() + ": was changed while the run began: give the same command again");
+        throw Error(ErrorCode::io,
+                    changed->string() + ": was changed while the run began: give the same command again");
     recorder.set_inputs(std::move(inputs));
     const std::uint64_t first_step = simulation.steps_taken();
     if (settings.resume) {
         recorder.take_over(simulation);
         if (!simulation.finished()) recorder.write_manifest(false, seconds_since(begin));
     } else if (settings.branch) {
+        begin_branch_folder(settings, folder, simulation.next_step());
         recorder.begin_branch(simulation);
     } else {
         remove_earlier_run(folder);
         recorder.begin();
     }
     recorder.start_video(simulation);
-    const bool was_complete = settings.resume && simulation.finished() && read_manifest(folder.manifest()).complete;
+    const bool was_complete =
+        settings.resume && simulation.finished() && read_manifest(folder.manifest()).complete;
     if (was_complete && settings.checkpoint && !recorder.makes_video()) {
         recorder.leave_complete();
         RunReport report = report_of(recorder, settings, simulation);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/scene_files.h"
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <utility>
@@ -10,7 +11,6 @@
 #include "density/vdb/vdb_file.h"
 #include "render/image/alpha_image.h"
 #include "scenes/format/errors.h"
-#include "scenes/format/named_files.h"
 #include "scenes/format/text.h"
 #include "simulation/billboard_files.h"
 #include "simulation/layer_simulation.h"
@@ -127,11 +127,11 @@ std::string hash_of_files(const Scene& scene) {
     return any ? digest.hex() : std::string();
 }
 
-FileStamps stamps_of(const Scene& scene, bool pictures) {
+FileStamps stamps_of(const Scene& scene, const std::vector<FileKind>& kinds) {
     FileStamps stamps;
     Scene named = scene;
     for_each_file(named, [&](const std::string&, FileKind kind, const std::filesystem::path& file) {
-        if (pictures || kind != FileKind::picture) stamps.emplace(file, file_stamp(file));
+        if (std::ranges::count(kinds, kind) > 0) stamps.emplace(file, file_stamp(file));
         return file;
     });
     return stamps;

@@ -7,10 +7,12 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "core/file_stamp.h"
 #include "render/terrain/terrain.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/scene.h"
 
 namespace nephos {
@@ -40,9 +42,9 @@ Scene with_files(Scene scene);
 // Returns a text that differs where their values differ; empty without files. `scene` as with_files() returns it.
 std::string hash_of_files(const Scene& scene);
 
-// Returns the stamps of the files that the scene names, at this moment; `pictures`: those of pictures, too. Whoever reads
-// the files more than once compares: all of it is of one content where no stamp has changed.
-FileStamps stamps_of(const Scene& scene, bool pictures);
+// Returns the stamps of the files of these kinds that the scene names, at this moment. Whoever reads the files more than
+// once compares: all of it is of one content where no stamp has changed. Thread-safe.
+FileStamps stamps_of(const Scene& scene, const std::vector<FileKind>& kinds);
 
 // Returns make_terrain() of the scene. Throws as it does, with the place of the height map.
 std::shared_ptr<const HeightMap> read_terrain(const Scene& scene);

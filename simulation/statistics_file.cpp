@@ -10,6 +10,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
@@ -120,7 +121,9 @@ StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::ui
     const std::uint64_t size = read_statistics(path, steps, visit, header, kStartAnew);
     if (!is_same_file(file.get(), path))  // what is cut is what was read
         throw Error(ErrorCode::io, path.string() + ": was removed or replaced while it was read");
-    if (::ftruncate(file.get(), off_t(size)) != 0) fail(path, errno);
+    struct stat status {};
+    const bool is_whole = ::fstat(file.get(), &status) == 0 && std::uint64_t(status.st_size) == size;
+    if (!is_whole && ::ftruncate(file.get(), off_t(size)) != 0) fail(path, errno);
     return StatisticsFile(path, std::move(file), size);
 }
 

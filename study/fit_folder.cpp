@@ -97,8 +97,9 @@ void write_results(const FitOptions& options, const FitResult& result, const std
     for (std::size_t d = 0; d < result.best.size(); ++d)
         for (const std::string& key : options.problem.parameters[d].keys)
             overrides.push_back(key + "=" + number_text(result.best[d]));
-    write_atomically(folder / "fitted.toml",
-                     to_toml(placed_scene(options.base.source->read(overrides, SceneUse::without_frames), folder)));
+    write_atomically(
+        folder / "fitted.toml",
+        to_toml(placed_scene(options.base.source->read(overrides, SceneUse::without_frames), folder)));
 
     using Json = nlohmann::ordered_json;
     const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(); };
@@ -146,10 +147,12 @@ void write_results(const FitOptions& options, const FitResult& result, const std
 
 }  // namespace
 
-std::optional<FitResult> run_fit(const FitOptions& options, const SweepJob& job,
+std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
                                  const std::function<void(int wave, const SweepProgress&)>& progress,
                                  const std::function<bool()>& stop) {
     require_fit_folder(job.folder);
+    FitOptions options = given;
+    if (!options.base.source) options.base.source.emplace(options.base.scene_file);
     // Bad ends of a prior are found before the first run.
     std::vector<std::vector<double>> ends;
     for (const double unit : {0.0, 1.0}) ends.emplace_back(options.problem.parameters.size(), unit);
@@ -157,9 +160,10 @@ std::optional<FitResult> run_fit(const FitOptions& options, const SweepJob& job,
     const Simulate simulate = [&](int wave, const std::vector<std::vector<double>>& points) {
         const SweepPlan plan = plan_of(options, points);
         if (plan.simulation_hash() != simulation_hash)
-            throw Error(ErrorCode::io, options.base.scene_file.string() +
-                                           ": a file that the scene names was changed after the fit began: the same "
-                                           "command fits with what is in it now");
+            throw Error(ErrorCode::io,
+                        options.base.scene_file.string() +
+                            ": a file that the scene names was changed after the fit began: the same "
+                            "command fits with what is in it now");
         SweepJob part = job;
         part.folder = job.folder / (wave == 4 ? "proof" : fmt::format("wave-{}", wave));
         const SweepReport report = run_sweep(

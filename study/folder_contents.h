@@ -4,15 +4,19 @@
 // What stands in the folder of a sweep or of a fit before anything is written into it.
 
 #include <filesystem>
+#include <string_view>
 
 namespace nephos {
 
 // Throws Error(usage) that names a file in the folder which a sweep would replace and no sweep wrote, as a scene or a plan of
-// the user's own, or what a run left. A folder with records is one of a sweep, and so is one with the plan of a sweep or
-// with tables.
+// the user's own, or what a run left. A folder with records is one of a sweep; elsewhere each file tells by its beginning.
+// Thread-safe.
 void require_sweep_folder(const std::filesystem::path& folder);
 
-// The same for a fit: fit.json, fitted.toml and posterior.csv.
+// The same for a fit, and the files of its result.
 void require_fit_folder(const std::filesystem::path& folder);
+
+// Throws Error(usage) when the file is there and does not begin as those that `by` writes: "a sweep". Thread-safe.
+void require_own(const std::filesystem::path& file, std::string_view beginning, std::string_view by);
 
 }  // namespace nephos

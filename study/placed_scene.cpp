@@ -25,14 +25,16 @@ bool begin_alike(const fs::path& a, const fs::path& b) {
 
 }  // namespace
 
-Scene placed_scene(Scene scene, const fs::path& folder) {
-    const fs::path from = normal(folder);
+fs::path placed_path(const fs::path& file, const fs::path& folder) {
+    const fs::path whole = normal(file), from = normal(folder);
     std::error_code error;
     const bool has_links = fs::weakly_canonical(from, error) != from;
-    for_each_file(scene, [&](const std::string&, FileKind, const fs::path& file) {
-        const fs::path whole = normal(file);
-        return has_links || !begin_alike(whole, from) ? whole : whole.lexically_relative(from);
-    });
+    return has_links || !begin_alike(whole, from) ? whole : whole.lexically_relative(from);
+}
+
+Scene placed_scene(Scene scene, const fs::path& folder) {
+    for_each_file(
+        scene, [&](const std::string&, FileKind, const fs::path& file) { return placed_path(file, folder); });
     return scene;
 }
 

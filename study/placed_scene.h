@@ -14,4 +14,7 @@ namespace nephos {
 // link, which makes ".." ambiguous. Neither the current folder nor the way in which the scene named them changes the result.
 Scene placed_scene(Scene scene, const std::filesystem::path& folder);
 
+// The same for one file.
+std::filesystem::path placed_path(const std::filesystem::path& file, const std::filesystem::path& folder);
+
 }  // namespace nephos

@@ -149,7 +149,7 @@ std::vector<std::filesystem::path> files_of_shards(const std::filesystem::path& 
     std::vector<std::filesystem::path> files;
     std::error_code error;
     std::filesystem::directory_iterator at(folder / "shards", error), end;
-    if (error == std::errc::no_such_file_or_directory) return files;
+    if (error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory) return files;
     for (; !error && at != end; at.increment(error))
         if (at->path().extension() == ".jsonl") files.push_back(at->path());
     if (error) throw Error(ErrorCode::io, (folder / "shards").string() + ": cannot read: " + error.message());
@@ -307,7 +307,8 @@ std::vector<float> Records::series(const RunRecord& record) const {
         const ssize_t got =
             ::pread(file.get(), packed.data() + had, packed.size() - had, off_t(record.series_offset + had));
         if (got < 0 && errno == EINTR) continue;
-        if (got <= 0)
+        if (got < 0) throw ReadFailure(path, std::strerror(errno));
+        if (got == 0)
             throw Error(ErrorCode::io, path.string() + ": does not hold the series that the records name");
         had += std::size_t(got);
     }
@@ -336,6 +337,18 @@ void remove_shards(const std::filesystem::path& folder, std::uint32_t number, st
             if (error) throw Error(ErrorCode::io, file.string() + ": cannot remove: " + error.message());
         }
     }
+}
+
+bool has_shards(const std::filesystem::path& folder) {
+    return std::ranges::any_of(files_of_shards(folder), [](const std::filesystem::path& path) {
+        const std::string name = path.stem().string();
+        const std::size_t middle = name.find("-of-");
+        const auto is_number = [](std::string_view text) {
+            return !text.empty() && text.find_first_not_of("0123456789") == text.npos;
+        };
+        return middle != name.npos && is_number(std::string_view(name).substr(0, middle)) &&
+               is_number(std::string_view(name).substr(middle + 4));
+    });
 }
 
 FolderGuard::FolderGuard(const std::filesystem::path& folder) : folder_(folder) {

@@ -79,6 +79,9 @@ class Records {
     std::size_t folders_ = 0;        // that were begun
 };
 
+// Returns whether a folder has a file of records, also one that is empty yet. Throws Error(io). Thread-safe.
+bool has_shards(const std::filesystem::path& folder);
+
 // Removes the shards of a folder, or only the one of a number where `of` is above 1. Throws Error(io), also when another
 // process writes one of them; then none is removed.
 void remove_shards(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of);

@@ -134,6 +134,7 @@ UntilReport run_until(RunSettings settings, const StopAt& stop, std::uint64_t ma
         report.series = series_report(file, settings.scene, stop);
         if (report.series.reached || steps >= max_steps) break;
         steps = std::min(max_steps, steps + steps / 2);
+        settings.stamps.clear();  // the next part has what was read of the files
         settings.resume = true;
         settings.overwrite = false;
     }
@@ -143,6 +144,7 @@ UntilReport run_until(RunSettings settings, const StopAt& stop, std::uint64_t ma
         settings.scene_hash = scene_hash(settings.scene);
         settings.range = {steps, 1, 0};
         settings.resume = true;
+        settings.stamps.clear();
         settings.checkpoint = false;
         report.run = run_scene(std::move(settings), observer);  // nothing is left to do but to remove it
     }

@@ -106,6 +106,13 @@ bool has_content(const std::filesystem::path& path, const std::string& content) 
     return read_beginning(path, content.size() + 1) == content;
 }
 
+Error changed_since(const std::filesystem::path& file) {
+    return {ErrorCode::io,
+            file.string() +
+                ": was changed after the sweep began: what is done is kept, and the same command "
+                "goes on with what is in the file now"};
+}
+
 // A folder whose plan is another one may get this one as soon as nobody makes runs of that; none has plans side by side.
 // Throws Error(io) before anything is changed.
 void require_place_for(const SweepPlan& plan, const FolderGuard& guard, const std::filesystem::path& folder) {
@@ -116,7 +123,7 @@ void require_place_for(const SweepPlan& plan, const FolderGuard& guard, const st
 
 void place_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
     write_atomically(folder / "scene.toml", plan.scene_text_in(folder));
-    write_atomically(folder / "sweep.toml", plan.to_toml());
+    write_atomically(folder / "sweep.toml", plan.to_toml_in(folder));
 }
 
 // Counts what is there. Goes over all runs, but keeps none.
@@ -155,7 +162,7 @@ void write_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
 
 bool is_plan_of(const SweepPlan& plan, const std::filesystem::path& folder) {
     return has_content(folder / "scene.toml", plan.scene_text_in(folder)) &&
-           has_content(folder / "sweep.toml", plan.to_toml());
+           has_content(folder / "sweep.toml", plan.to_toml_in(folder));
 }
 
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job) {
@@ -196,23 +203,27 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
     Shard& shard = *opened;
     std::uint64_t at = 0;
     bool give_up = false;
+    std::optional<std::filesystem::path> changed;  // a file that the plan was made of: no more runs
+    const auto look_at_files_of = [&](const PlannedRun& run) {
+        if (!changed) changed = plan.changed_file(run);
+        return changed.has_value();
+    };
     const auto next = [&]() -> std::optional<std::uint64_t> {
         while (at < plan.runs() && !is_wanted(plan.run(at))) ++at;
-        if (give_up || at == plan.runs()) return std::nullopt;
-        plan.require_files();
+        if (give_up || at == plan.runs() || look_at_files_of(plan.run(at))) return std::nullopt;
         return at++;
     };
     const Task task = [&](std::uint64_t number) {
         const PlannedRun run = plan.run(number);
-        const Scene scene = plan.scene_of(run);
-        return packed(run_for_statistics(scene, plan.options(), run.replicate == 0,
-                                         [&] { plan.require_files_of(scene); }));
+        return packed(run_for_statistics(plan.scene_of(run), plan.options(), run.replicate == 0, [&] {
+            if (const auto file = plan.changed_file(run)) throw changed_since(*file);
+        }));
     };
     const TaskEnd end = [&](std::uint64_t number, const std::string& result,
                             const std::optional<std::string>& failure) {
         const PlannedRun run = plan.run(number);
+        if (failure && look_at_files_of(run)) return;  // it failed for that
         if (failure) {
-            plan.require_files();  // it failed for that
             shard.add_failure(run, *failure);
             ++count.failed;
             give_up = give_up || job.fail_fast;
@@ -238,6 +249,7 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
     report.wall_s = std::chrono::duration<double>(Clock::now() - begin).count();
     if (const int error = add_timing(timing, job, workers.count, count.done - count.before, report.wall_s))
         report.problems.push_back(times.string() + ": cannot write: " + std::strerror(error));
+    if (changed) throw changed_since(*changed);
     return report;
 }
 

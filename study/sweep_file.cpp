@@ -148,8 +148,9 @@ Axis parse_axis(const std::string& text) {
         rest.remove_prefix(prefix.size());
     }
     const std::size_t dots = rest.find("..");
+    const bool is_file = rest.find('/') != rest.npos;  // "../a.vdb"
     const bool is_range =
-        dots != rest.npos && std::string_view("\"'[{").find(rest[0]) == std::string_view::npos;
+        dots != rest.npos && !is_file && std::string_view("\"'[{").find(rest[0]) == std::string_view::npos;
     if (!is_range) {
         if (axis.scale != Scale::linear) fail("names a scale but no range");
         for (const std::string& value : pieces(rest, ',')) axis.values.emplace_back(trimmed(value));
@@ -205,7 +206,8 @@ SweepOptions read_sweep_file(const std::filesystem::path& path) {
         options.tracks = table.flag("tracks").value_or(false);
         options.layer = table.text("layer").value_or("");
         table.table("steps", [&](TomlTable& steps) { read_steps(steps, options.steps); });
-        table.tables("axis", [&](TomlTable& axis) { read_axis(axis, path.parent_path(), options); });
+        const std::filesystem::path folder = path.parent_path() / table.text("folder").value_or("");
+        table.tables("axis", [&](TomlTable& axis) { read_axis(axis, folder, options); });
     });
     return options;
 }

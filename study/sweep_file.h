@@ -11,7 +11,7 @@
 namespace nephos {
 
 // Reads a sweep file; the scene in it, and files that are values of an axis, are relative to its
-// folder. Throws SceneErrors with every problem, Error(io).
+// folder; the latter to the `folder` that it names. Throws SceneErrors with every problem, Error(io).
 SweepOptions read_sweep_file(const std::filesystem::path& path);
 
 // Returns true for a TOML file with a key `scene`: a sweep file, and no scene. Throws Error(io).

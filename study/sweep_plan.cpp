@@ -8,6 +8,7 @@
 #include <span>
 #include <tuple>
 
+#include "study/axis_files.h"
 #include "study/placed_scene.h"
 #include "study/toml_table.h"
 #include <fmt/format.h>
@@ -18,7 +19,7 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "core/wind_field.h"
-#include "scenes/format/named_files.h"
+#include "scenes/format/given_keys.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
 #include "scenes/format/writer.h"
@@ -63,11 +64,6 @@ std::string canonical_value(const std::string& value) {
 }
 
 bool is_compound(const std::string& value) { return value.starts_with('[') || value.starts_with('{'); }
-
-// Returns whether a key is another one or in it: "a.b[0]" in "a.b" and "a".
-bool is_within(std::string_view key, std::string_view outer) {
-    return key == outer || (key.starts_with(outer) && (key[outer.size()] == '.' || key[outer.size()] == '['));
-}
 
 std::uint64_t point_count(const SweepOptions& options) {
     if (is_sampled(options.design)) return options.points;
@@ -159,13 +155,6 @@ void check_options(const SweepOptions& options) {
     if (point_count(options) > kMaxPoints) fail(fmt::format("the grid has more than {} points", kMaxPoints));
 }
 
-// Throws Error(io) when one of the files has changed.
-void require(const FileStamps& stamps) {
-    if (const auto changed = first_changed(stamps))
-        throw Error(ErrorCode::io, changed->string() + ": was changed after the sweep began: the same command goes on with "
-                                                       "what is in it now");
-}
-
 }  // namespace
 
 std::string canonical_key(std::string_view key) {
@@ -208,7 +197,7 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     check_options(options_);
     if (!options_.source) options_.source.emplace(options_.scene_file);
     scene_ = options_.source->read(options_.overrides, SceneUse::without_frames);
-    stamps_ = stamps_of(scene_, false);
+    stamps_ = stamps_of(scene_, {FileKind::first_state, FileKind::simulation});
     std::vector<std::string> lattices;
     for (const LayerOptions& layer : scene_.layers)
         if (layer.automaton && !layer.is_veil) lattices.push_back(layer.name);
@@ -244,55 +233,39 @@ std::size_t SweepPlan::measured_lattice() const {
 }
 
 std::string SweepPlan::scene_text_in(const std::filesystem::path& folder) const {
-    return nephos::to_toml(placed_scene(scene_, folder));
-}
-
-Scene SweepPlan::check_value(std::size_t axis_number, std::size_t n, const std::string& value) {
-    Axis& axis = options_.axes[axis_number];
-    std::vector<std::string> overrides = options_.overrides;
-    for (const std::string& key : axis.keys) overrides.push_back(key + "=" + value);
-    Scene scene = options_.source->read(overrides, SceneUse::without_frames);
-    bool has_files = false;
-    std::string placed = value;
-    for_each_file(scene, [&](const std::string& key, FileKind, const std::filesystem::path& file) {
-        if (std::ranges::none_of(axis.keys, [&](const std::string& of) { return is_within(key, of); }))
-            return file;
-        has_files = true;
-        if (file.is_absolute()) return file;
-        // The runs find a file from any folder: that of the call, of the sweep, of another machine's task.
-        if (is_compound(value))
-            throw Error(
-                ErrorCode::usage,
-                fmt::format(
-                    "axis {}: value {}, {}, names the file {}: expected an absolute path, as runs of the "
-                    "sweep are repeated in other folders",
-                    joined_keys(axis), n + 1, value, file.string()));
-        std::filesystem::path whole = std::filesystem::absolute(axis.folder / file).lexically_normal();
-        placed = toml_string(whole.string());
-        return whole;
-    });
-    if (!has_files) return scene;
-    axis.values[n] = placed;
-    stamps_.merge(stamps_of(scene, false));
-    contents_[axis_number][placed] = simulation_start(scene).simulation_hash;
-    return scene;
+    return std::string(kWrittenBySweep) + given_toml(placed_scene(scene_, folder));
 }
 
 std::vector<std::vector<std::string>> SweepPlan::check_axes() {
     std::vector<std::vector<std::string>> equals;
-    contents_.resize(options_.axes.size());
+    files_.resize(options_.axes.size());
     for (std::size_t a = 0; a < options_.axes.size(); ++a) {
-        const Axis& axis = options_.axes[a];
+        Axis& axis = options_.axes[a];
         std::vector<std::string> values = axis.values;
         if (values.empty()) values = {value_at(axis, 0), value_at(axis, 1)};
         // Numbers and words have one text each; arrays and tables may say the same in several.
         const bool may_equal =
             std::ranges::any_of(values, [](const std::string& value) { return is_compound(value); });
         std::map<std::pair<std::uint64_t, std::uint64_t>, std::size_t> scenes;
+        std::map<std::string, std::size_t> contents;
         std::vector<std::string>& firsts = equals.emplace_back(values);
         for (std::size_t n = 0; n < values.size(); ++n) {
-            const Scene scene = check_value(a, n, values[n]);
-            if (!axis.values.empty()) firsts[n] = values[n] = axis.values[n];
+            std::vector<std::string> overrides = options_.overrides;
+            for (const std::string& key : axis.keys) overrides.push_back(key + "=" + values[n]);
+            const Scene scene = options_.source->read(overrides, SceneUse::without_frames);
+            if (std::optional<AxisFiles> files = axis_files(axis, values[n], scene)) {
+                values[n] = firsts[n] = axis.values.at(n) = axis_value(*files, files->paths);
+                const std::size_t first = contents.emplace(files->digest, n).first->second;
+                if (first != n && options_.design == Design::grid)
+                    throw Error(
+                        ErrorCode::usage,
+                        fmt::format(
+                            "axis {}: value {} is {}, and has the content of value {}, {}: expected each "
+                            "value once",
+                            joined_keys(axis), n + 1, values[n], first + 1, values[first]));
+                files_[a].emplace(values[n], std::move(*files));
+                continue;
+            }
             if (!may_equal) continue;
             const StateHash hash = hash_of_text(nephos::to_toml(scene));
             const std::size_t first = scenes.emplace(std::pair(hash.high, hash.low), n).first->second;
@@ -305,9 +278,6 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
                                 "value once",
                                 joined_keys(axis), n + 1, values[n], first + 1, values[first]));
         }
-        // Two names may be of one file.
-        if (options_.design == Design::grid && !contents_[a].empty())
-            require_different(axis, "axis " + joined_keys(axis));
     }
     // Values that are good alone may contradict each other.
     if (points_ > 0) scene_of(run(0));
@@ -367,10 +337,9 @@ std::vector<std::string> SweepPlan::values_of_point(std::uint64_t point) const {
 std::string SweepPlan::identity(const std::vector<std::string>& values) const {
     std::vector<std::string> lines;
     for (std::size_t n = 0; n < values.size(); ++n) {
-        const auto content = contents_[n].find(values[n]);
-        const std::string of_files = content == contents_[n].end() ? "" : " " + content->second;
-        for (const std::string& key : options_.axes[n].keys)
-            lines.push_back(key + "=" + values[n] + of_files + "\n");
+        const auto files = files_[n].find(values[n]);
+        const std::string value = files == files_[n].end() ? values[n] : "content " + files->second.digest;
+        for (const std::string& key : options_.axes[n].keys) lines.push_back(key + "=" + value + "\n");
     }
     std::ranges::sort(lines);
     return fmt::format("{}", fmt::join(lines, ""));
@@ -409,13 +378,13 @@ Scene SweepPlan::scene_of(const PlannedRun& run) const {
     return scene;
 }
 
-void SweepPlan::require_files_of(const Scene& scene) const {
-    FileStamps planned;
-    for (const auto& [path, now] : stamps_of(scene, false)) planned[path] = stamps_.at(path);
-    require(planned);
+std::optional<std::filesystem::path> SweepPlan::changed_file(const PlannedRun& run) const {
+    if (auto changed = first_changed(stamps_)) return changed;
+    for (std::size_t n = 0; n < run.values.size(); ++n)
+        if (const auto found = files_[n].find(run.values[n]); found != files_[n].end())
+            if (auto changed = first_changed(found->second.stamps)) return changed;
+    return {};
 }
-
-void SweepPlan::require_files() const { require(stamps_); }
 
 std::string SweepPlan::options_of(const PlannedRun& run) const {
     std::string command;
@@ -430,9 +399,10 @@ std::string SweepPlan::command_of(const PlannedRun& run, std::uint64_t steps) co
                        options_of(run), steps, run.id.substr(0, 8));
 }
 
-std::string SweepPlan::to_toml() const {
+std::string SweepPlan::to_toml_in(const std::filesystem::path& folder) const {
     const SweepOptions& o = options_;
-    std::string text = fmt::format("scene = \"scene.toml\"\ndesign = \"{}\"\n", design_name(o.design));
+    std::string text(kWrittenBySweep);
+    text += fmt::format("scene = \"scene.toml\"\ndesign = \"{}\"\n", design_name(o.design));
     if (is_sampled(o.design)) text += fmt::format("points = {}\n", o.points);
     text += fmt::format("replicates = {}\nseed = {}\nseeds = \"{}\"\n", o.replicates, o.seed,
                         o.common_seeds ? "common" : "per_point");
@@ -444,7 +414,8 @@ std::string SweepPlan::to_toml() const {
         text += fmt::format("until = {{ statistic = \"{}\", standard_error = {} }}\n",
                             o.steps.until->statistic, number_text(o.steps.until->standard_error));
     constexpr std::string_view kScales[] = {"linear", "log", "integer"};
-    for (const Axis& axis : o.axes) {
+    for (std::size_t a = 0; a < o.axes.size(); ++a) {
+        const Axis& axis = o.axes[a];
         text += "\n[[axis]]\n";
         std::vector<std::string> keys;
         for (const std::string& key : axis.keys) keys.push_back('"' + key + '"');
@@ -453,7 +424,16 @@ std::string SweepPlan::to_toml() const {
             text += fmt::format("range = {{ from = {}, to = {}, scale = \"{}\" }}\n", number_text(axis.from),
                                 number_text(axis.to), kScales[std::size_t(axis.scale)]);
         } else {
-            text += fmt::format("values = [{}]\n", fmt::join(axis.values, ", "));
+            std::vector<std::string> values = axis.values;
+            for (std::string& value : values) {
+                const auto found = files_[a].find(value);
+                if (found == files_[a].end()) continue;
+                std::vector<std::filesystem::path> names;
+                for (const std::filesystem::path& path : found->second.paths)
+                    names.push_back(placed_path(path, folder));
+                value = axis_value(found->second, names);
+            }
+            text += fmt::format("values = [{}]\n", fmt::join(values, ", "));
         }
     }
     return text;

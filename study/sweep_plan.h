@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "study/axis_files.h"
 #include "study/design.h"
 
 #include "core/file_stamp.h"
@@ -27,6 +28,9 @@
 #include "scenes/format/scene.h"
 
 namespace nephos {
+
+// The first line of the plan and of the scene that a sweep writes.
+inline constexpr std::string_view kWrittenBySweep = "# Written by nephos sweep.\n";
 
 enum class Scale { linear, log, integer };
 
@@ -90,7 +94,8 @@ class SweepPlan {
 
     const SweepOptions& options() const { return options_; }
     const Scene& scene() const { return scene_; }                  // with the overrides of all runs
-    // Returns the canonical text of the scene for a folder: as placed_scene().
+    // Returns the text of the scene for a folder, with the keys that it was given (given_keys.h) and names of files as
+    // placed_scene(): with the values of a run it is the scene of that run.
     std::string scene_text_in(const std::filesystem::path& folder) const;
     // Returns the place of the lattice that is measured among those of the scene.
     std::size_t measured_lattice() const;
@@ -100,33 +105,28 @@ class SweepPlan {
     PlannedRun run(std::uint64_t number) const;
     // Returns the scene of a run, as its text was when the plan was made. Throws as read_scene().
     Scene scene_of(const PlannedRun& run) const;
-    // Throws Error(io) that names a file of the scene of a run, or of any, that is not as it was when the plan was made: the
-    // run has another id.
-    void require_files_of(const Scene& scene) const;
-    void require_files() const;
+    // Returns a file of a run that is not as it was when the plan was made: the run would have another id.
+    std::optional<std::filesystem::path> changed_file(const PlannedRun& run) const;
     const std::string& simulation_hash() const { return simulation_hash_; }  // of scene()
     // Returns the options of scene_of(), quoted for a shell: "--set KEY=VALUE ... --seed N".
     std::string options_of(const PlannedRun& run) const;
     // Returns the command that repeats so many steps of a run, in the folder of the sweep: "nephos run ...".
     std::string command_of(const PlannedRun& run, std::uint64_t steps) const;
-    // Returns the canonical sweep file; the scene that it names is scene_text_in() its folder.
-    std::string to_toml() const;
+    // Returns the canonical sweep file for a folder; the scene that it names is scene_text_in() of it.
+    std::string to_toml_in(const std::filesystem::path& folder) const;
 
   private:
     // Returns for each value of each axis the first one of the axis that is the same.
     std::vector<std::vector<std::string>> check_axes();
-    // Reads the scene with value `n` of an axis, and settles which files that value names.
-    Scene check_value(std::size_t axis, std::size_t n, const std::string& value);
     // `equals`: as check_axes() returns it.
     void require_different_points(const std::vector<std::vector<std::string>>& equals) const;
     std::string identity(const std::vector<std::string>& values) const;
 
     SweepOptions options_;
     Scene scene_;
-    FileStamps stamps_;  // of the files of all runs, before they were read
+    FileStamps stamps_;  // of the files of scene(), before they were read
     std::string simulation_hash_;
-    std::vector<std::map<std::string, std::string>>
-        contents_;  // of each axis: by value, of the files that it names
+    std::vector<std::map<std::string, AxisFiles>> files_;  // of each axis, by value
     std::uint64_t points_ = 0;
     std::vector<double> unit_points_;  // of sampled designs
 };

@@ -91,9 +91,9 @@ void AutosaveFile::claim(const fs::path& folder, const std::string& name) {
     std::error_code error;
     fs::create_directories(folder, error);
     if (error) fail(folder, "cannot create the folder", error.value());
-    // For this user alone: the scene itself may be.
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
         const fs::path path = numbered(folder, name, attempt);
+        // Readable by this user alone, as the scene may be private.
         Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
         if (file.get() < 0 && errno == EEXIST) continue;
         if (file.get() < 0) fail(path, "cannot be written", errno);
@@ -107,7 +107,7 @@ void AutosaveFile::claim(const fs::path& folder, const std::string& name) {
 
 void AutosaveFile::write(const fs::path& folder, const std::string& name, std::string_view text) {
     if (!is_in_place()) claim(folder, name);
-    AtomicFile next(path_);
+    AtomicFile next(path_, Access::owner);
     Descriptor file(::open(next.temporary().c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
     if (file.get() < 0) fail(path_, "cannot be written", errno);
     lock(file.get());  // before it gets the name: nobody sees it without

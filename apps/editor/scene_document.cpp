@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/editor/scene_document.h"
 
+#include <chrono>
 #include <system_error>
 #include <utility>
 
@@ -205,10 +206,11 @@ void SceneDocument::take_autosave(const LeftAutosave& left) {
 }
 
 std::optional<fs::file_time_type> SceneDocument::file_newer_than(const LeftAutosave& left) const {
-    if (!has_file_ || file_stamp_ != stamp_of(path_)) return std::nullopt;  // another version than the one that was read
-    std::error_code error;
-    const fs::file_time_type time = fs::last_write_time(path_, error);
-    return !error && time > left.time ? std::optional(time) : std::nullopt;
+    if (!has_file_ || !file_stamp_) return std::nullopt;
+    const std::chrono::sys_time<std::chrono::nanoseconds> written{
+        std::chrono::nanoseconds(file_stamp_->written_ns)};
+    const fs::file_time_type time = std::chrono::file_clock::from_sys(written);
+    return time > left.time ? std::optional(time) : std::nullopt;
 }
 
 }  // namespace nephos

@@ -35,8 +35,10 @@ std::filesystem::path settings_folder() {
     const char* home = std::getenv("HOME");
     if (home == nullptr || *home != '/') {
         const passwd* user = ::getpwuid(::geteuid());
-        // Never a folder that all may write to: another user would have made its own in it.
-        home = user != nullptr && user->pw_dir != nullptr ? user->pw_dir : "/nonexistent";
+        // Never a folder that all may write to, where another user might have made one. In /dev/null there is none: nothing
+        // is remembered.
+        home =
+            user != nullptr && user->pw_dir != nullptr && *user->pw_dir == '/' ? user->pw_dir : "/dev/null";
     }
     return std::filesystem::path(home) / ".config" / "nephos";
 }
@@ -63,7 +65,8 @@ Settings read_settings(const std::filesystem::path& folder) {
         if (key == "plots") settings.plots = value != "off";
         if (key == "shapes") settings.shapes = value != "off";
         if (key == "theme") settings.dark = value != "light";
-        if (key == "scale" && value != "0") take(value, kSmallestTextScale, kLargestTextScale, settings.scale);
+        if (key == "scale" && value != "0")
+            take(value, kSmallestTextScale, kLargestTextScale, settings.scale);
         if (key == "recent" && settings.recent.size() < kMostRecent) settings.recent.push_back(value);
     }
     return settings;

@@ -11,7 +11,7 @@
 
 namespace nephos {
 
-// Of texts and controls; 1 is for 96 dots an inch.
+// The range of the scale of texts and controls: 1 fits a display of 96 dots an inch.
 inline constexpr float kSmallestTextScale = 0.5f, kLargestTextScale = 4;
 
 struct Settings {

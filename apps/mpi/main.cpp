@@ -84,7 +84,8 @@ void simulate(const Arguments& a) {
         if (a.hash && ranks.rank() == 0) {
             const std::string line = fmt::format("{} {}\n", step, hash);
             if (std::fputs(line.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
-                throw Error(ErrorCode::io, std::string("standard output: cannot write: ") + std::strerror(errno));
+                throw Error(ErrorCode::io,
+                            std::string("standard output: cannot write: ") + std::strerror(errno));
         }
         if (step == steps) break;
         ranks.step();
@@ -115,11 +116,15 @@ int parse(CLI::App& app, int argc, char** argv, Arguments& a) {
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     app.add_option("--seed", a.seed, "Seed instead of the scene's")
         ->check(whole_number(std::numeric_limits<std::uint64_t>::max()));
-    app.add_option("--steps", a.steps, "Steps instead of the scene's time.steps")->check(whole_number(kMaxSteps));
+    app.add_option("--steps", a.steps, "Steps instead of the scene's time.steps")
+        ->check(whole_number(kMaxSteps));
     app.add_flag("--hash", a.hash, "Print the state hash after every step, as `nephos hash` does");
     app.add_option("-o,--out", a.out, "Folder for statistics.csv, with a row a step")
-        ->check([](const std::string& text) { return text.empty() ? std::string("expected a folder") : std::string(); });
-    app.add_flag("--overwrite", a.overwrite, "Replace statistics.csv and levels of an earlier call")->needs("--out");
+        ->check([](const std::string& text) {
+            return text.empty() ? std::string("expected a folder") : std::string();
+        });
+    app.add_flag("--overwrite", a.overwrite, "Replace statistics.csv and levels of an earlier call")
+        ->needs("--out");
     app.add_flag("--write-state", a.write_state,
                  "Write the last state's cld to --out, as VDB files of some levels each")
         ->needs("--out");

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <span>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -28,7 +29,11 @@ std::vector<fs::path> earlier_files(const fs::path& folder) {
     std::error_code error;
     for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
         const std::string name = at->path().filename().string();
-        const bool is_levels = name.starts_with("levels_") && name.ends_with(".vdb");
+        constexpr std::string_view kBegin = "levels_", kEnd = ".vdb";
+        bool is_levels = name.starts_with(kBegin) && name.ends_with(kEnd) &&
+                         name.size() >= kBegin.size() + 5 + kEnd.size();
+        for (std::size_t n = kBegin.size(); is_levels && n < name.size() - kEnd.size(); ++n)
+            is_levels = name[n] >= '0' && name[n] <= '9';
         if (is_levels || name == "statistics.csv") files.push_back(at->path());
     }
     if (error) throw Error(ErrorCode::io, folder.string() + ": cannot read the folder: " + error.message());
@@ -38,11 +43,14 @@ std::vector<fs::path> earlier_files(const fs::path& folder) {
 // Returns the place of the table, where nothing stands any more.
 fs::path cleared(const fs::path& folder, bool overwrite) {
     std::error_code error;
-    if (fs::exists(fs::symlink_status(folder / "manifest.json", error)))
-        throw Error(ErrorCode::usage, folder.string() + ": holds a run or a sweep (manifest.json): give another folder");
+    for (const char* name : {"manifest.json", "checkpoint.nephos", "sweep.toml", "shards"})
+        if (fs::exists(fs::symlink_status(folder / name, error)))
+            throw Error(ErrorCode::usage, fmt::format("{}: holds a run or a sweep ({}): give another folder",
+                                                      folder.string(), name));
     const std::vector<fs::path> files = earlier_files(folder);
     if (!files.empty() && !overwrite)
-        throw Error(ErrorCode::usage, files.front().string() + ": is there already: give --overwrite, or another folder");
+        throw Error(ErrorCode::usage,
+                    files.front().string() + ": is there already: give --overwrite, or another folder");
     for (const fs::path& file : files)
         if (!fs::remove(file, error) && error)
             throw Error(ErrorCode::io, file.string() + ": cannot remove: " + error.message());
@@ -51,18 +59,18 @@ fs::path cleared(const fs::path& folder, bool overwrite) {
 
 }  // namespace
 
-StatisticsTable::StatisticsTable(const fs::path& folder, bool overwrite)
-    : lock_(folder, "run") {
+StatisticsTable::StatisticsTable(const fs::path& folder, bool overwrite) : lock_(folder, "run") {
     path_ = cleared(folder, overwrite);
     file_ = open_regular_file(path_, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW);
     write("step,time_s,hum,act,cld,cloud_cover,base_m,top_m,base_mean_m,top_mean_m,perimeter_m,hash\n");
 }
 
-void StatisticsTable::add(std::uint64_t step, double time_s, const CloudStatistics& s, const std::string& hash) {
+void StatisticsTable::add(std::uint64_t step, double time_s, const CloudStatistics& s,
+                          const std::string& hash) {
     lock_.require_in_place();
     write(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", step, number_text(time_s), s.hum, s.act, s.cld,
-                      field(s.cover), field(s.base_m), field(s.top_m), field(s.base_mean_m), field(s.top_mean_m),
-                      field(s.perimeter_m), hash));
+                      field(s.cover), field(s.base_m), field(s.top_m), field(s.base_mean_m),
+                      field(s.top_mean_m), field(s.perimeter_m), hash));
 }
 
 void StatisticsTable::write(const std::string& text) {

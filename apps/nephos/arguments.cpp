@@ -150,6 +150,13 @@ void add_scene_changes(CLI::App& command, SceneArguments& arguments) {
               });
 }
 
+void add_out_folder(CLI::App& command, std::string& out, const std::string& description) {
+    add_value(command, "-o,--out", "DIR", description, [&out](const std::string& text) {
+        if (text.empty()) throw Error(ErrorCode::usage, "'': expected the path of a folder");
+        out = text;
+    });
+}
+
 void add_device(CLI::App& command, DeviceArguments& arguments) {
     add_value(
         command, "--splatting", "BACK-END",
@@ -188,8 +195,9 @@ Scene load_scene(const SceneArguments& arguments, SceneUse use) {
 
 void refuse_to_replace(const std::string& from, const std::string& to) {
     std::error_code error;
-    if (!to.empty() && std::filesystem::equivalent(from, to, error))
-        throw Error(ErrorCode::usage, to + ": is the file that is read: expected the name of another one to write");
+    if (!from.empty() && !to.empty() && std::filesystem::equivalent(from, to, error))
+        throw Error(ErrorCode::usage,
+                    to + ": is the file that is read: expected the name of another one to write");
 }
 
 void print_scene_errors(const SceneErrors& errors) {

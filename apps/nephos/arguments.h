@@ -61,6 +61,9 @@ void add_quiet(CLI::App& command, WorkArguments& arguments);
 CLI::Option* add_value(CLI::App& command, const std::string& name, const std::string& type,
                        const std::string& description, std::function<void(const std::string&)> use);
 
+// Adds -o,--out for a folder, whose name may not be empty as that of a variable without a value is.
+void add_out_folder(CLI::App& command, std::string& out, const std::string& description);
+
 // Conversions for add_value; throw Error(usage) unless the whole text is a number in min..max.
 std::int64_t parse_integer(const std::string& text, std::int64_t min, std::int64_t max);
 std::uint64_t parse_unsigned(const std::string& text, std::uint64_t min, std::uint64_t max);
@@ -76,7 +79,7 @@ DeviceOptions device_options(const DeviceArguments& arguments, const FrameOption
 // Returns the scene with its changes applied. Throws as read_scene().
 Scene load_scene(const SceneArguments& arguments, SceneUse use = SceneUse::everything);
 
-// Throws Error(usage) when the file to write is the one that was read; `to` may be empty.
+// Throws Error(usage) when the file to write is one that is read; either may be empty.
 void refuse_to_replace(const std::string& from, const std::string& to);
 
 // Prints every problem on standard error, "error:" in colour on a terminal.

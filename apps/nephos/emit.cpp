@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/nephos/emit.h"
 
+#include "study/folder_contents.h"
 #include "study/sweep.h"
 #include <fmt/format.h>
 
@@ -47,6 +48,8 @@ rule shard:
     shell: "{{NEPHOS:q}} sweep sweep.toml --shard {{wildcards.shard}}/{0} --workers {{threads}} --out . --quiet"
 )";
 
+constexpr std::string_view kProgram = "\"${NEPHOS:-nephos}\"";
+
 }  // namespace
 
 Engine parse_engine(const std::string& text) {
@@ -58,8 +61,12 @@ Engine parse_engine(const std::string& text) {
 
 std::string emit_sweep(const SweepPlan& plan, Engine engine, std::uint32_t shards,
                        const std::filesystem::path& folder) {
+    constexpr std::string_view kScripts[][2] = {{"sweep.slurm", "#!/bin/bash\n# Runs a sweep in "},
+                                                {"Snakefile", "# Runs a sweep in "},
+                                                {"sweep.parallel", kProgram}};
+    for (const auto& [name, beginning] : kScripts) require_own(folder / name, beginning, "a sweep");
     write_plan(plan, folder);
-    const std::string go = fmt::format("cd {}\n", shell_word(folder.string()));
+    const std::string go = fmt::format("cd -- {}\n", shell_word(folder.string()));
     switch (engine) {
         case Engine::slurm:
             write_atomically(folder / "sweep.slurm", fmt::format(kSlurm, shards, shards - 1));
@@ -70,9 +77,8 @@ std::string emit_sweep(const SweepPlan& plan, Engine engine, std::uint32_t shard
         case Engine::parallel: {
             std::string lines;
             for (std::uint32_t shard = 0; shard < shards; ++shard)
-                lines += fmt::format(
-                    "\"${{NEPHOS:-nephos}}\" sweep sweep.toml --shard {}/{} --workers 1 --out . --quiet\n",
-                    shard, shards);
+                lines += fmt::format("{} sweep sweep.toml --shard {}/{} --workers 1 --out . --quiet\n",
+                                     kProgram, shard, shards);
             write_atomically(folder / "sweep.parallel", lines);
             return go + "parallel --jobs 2 --joblog parallel.log < sweep.parallel\nnephos merge .";
         }

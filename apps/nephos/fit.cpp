@@ -76,7 +76,7 @@ void add_fit_command(CLI::App& app, Action& action) {
     command->add_option("FILE", a->file, "Fit file (TOML): scene, parameters with priors, targets")
         ->required()
         ->type_name("FILE");
-    command->add_option("-o,--out", a->out, "Folder to write to (default: out/fit-NAME)")->type_name("DIR");
+    add_out_folder(*command, a->out, "Folder to write to (default: out/fit-NAME)");
     add_value(*command, "--runs", "N", "Runs without the proof, instead of the file's",
               [a](const std::string& text) { a->runs = parse_unsigned(text, 8, 1'000'000); });
     add_value(*command, "-j,--workers", "N",

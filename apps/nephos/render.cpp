@@ -134,6 +134,7 @@ void add_cloud_options(CLI::App& command, RenderArguments& a) {
 
 void check_outputs(const RenderArguments& a) {
     for (const std::string& out : a.out) {
+        refuse_to_replace(a.file, out);
         if (extension_of(out) == ".png" || extension_of(out) == ".exr") continue;
         throw Error(ErrorCode::usage, fmt::format("--out '{}' does not end with .png or .exr", out));
     }

@@ -68,7 +68,7 @@ Scene scene_of(const RunArguments& a, const Continued& continued) {
     Scene scene;
     if (a.scene.file.empty()) {
         const std::string& from = continued.has_scene ? a.out : a.from;
-        scene = read_scene_text(scene_text_beside(from), "scene_text of " + from, {}, a.scene.overrides, use);
+        scene = read_scene_text(scene_text_beside(from), "the scene of " + from, {}, a.scene.overrides, use);
         if (a.scene.seed) scene.automaton.seed = *a.scene.seed;
     } else {
         scene = load_scene(a.scene, use);
@@ -301,11 +301,7 @@ void add_run_command(CLI::App& app, Action& action) {
             "Branch off another run: start from its checkpoint (its folder, or the file) with the scene that "
             "--set changes; without SCENE that of the run. Needs --out; with --resume not needed any more")
         ->type_name("RUN");
-    add_value(*command, "-o,--out", "DIR", "Folder to write to (default: out/NAME)",
-              [a](const std::string& text) {
-                  if (text.empty()) throw Error(ErrorCode::usage, "'': expected the path of a folder");
-                  a->out = text;
-              });
+    add_out_folder(*command, a->out, "Folder to write to (default: out/NAME)");
     add_value(*command, "--frames", "A..B",
               "Write only these frames, counted from 1; A.., ..B and A alone work too",
               [a](const std::string& text) { a->frames = parse_frames(text); });

@@ -15,6 +15,7 @@
 #include "density/statistics.h"
 #include "density/vdb/vdb_file.h"
 #include "scenes/format/errors.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/writer.h"
 #include "simulation/frame_writer.h"
 #include "simulation/layer_simulation.h"
@@ -52,6 +53,12 @@ int state(const StateArguments& a) {
     const ThreadLimit limit(a.work.threads);
     const Scene scene = load_scene(a.scene, SceneUse::without_frames);
     refuse_to_replace(a.scene.file, a.out);
+    refuse_to_replace(a.from, a.out);
+    Scene named = scene;
+    for_each_file(named, [&](const std::string&, FileKind, const std::filesystem::path& file) {
+        refuse_to_replace(file.string(), a.out);
+        return file;
+    });
     std::vector<LayerSimulation> layers = start_layers(scene, a.scene.file, a.from);
     const Automaton& automaton = *layers[chosen_layer(a, layers)].automaton();
     const std::uint64_t steps = a.steps.value_or(scene.steps);

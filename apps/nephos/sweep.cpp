@@ -228,6 +228,9 @@ int sweep(const SweepArguments& a) {
             output.line(fmt::format("  ... and {} more", human_count(plan.runs() - 10)));
         return status;
     }
+    if (a.emit && a.shards > 1)
+        throw Error(ErrorCode::usage,
+                    "--emit writes all shards: leave out --shard, and give their number as --tasks");
     if (a.emit) {
         const std::string next = emit_sweep(plan, *a.emit, a.tasks, job.folder);
         if (!a.work.quiet) print_note(describe(plan));
@@ -318,7 +321,7 @@ void add_sweep_command(CLI::App& app, Action& action) {
         ->required()
         ->type_name("SCENE");
     add_scene_changes(*command, a->scene);
-    command->add_option("-o,--out", a->out, "Folder to write to (default: out/sweep-NAME)")->type_name("DIR");
+    add_out_folder(*command, a->out, "Folder to write to (default: out/sweep-NAME)");
     command
         ->add_option("--axis", a->axes,
                      "A key and its values: KEY=V,V,.. or KEY=FROM..TO:COUNT or KEY=log:FROM..TO:COUNT; "
@@ -395,7 +398,7 @@ void add_merge_command(CLI::App& app, Action& action) {
     command->add_option("DIR", a->folders, "Folders of the sweep; the plan is that of the first")
         ->required()
         ->type_name("DIR");
-    command->add_option("-o,--out", a->out, "Folder for the tables (default: the first)")->type_name("DIR");
+    add_out_folder(*command, a->out, "Folder for the tables (default: the first)");
     command->add_flag("--overwrite", a->overwrite,
                       "Replace tables that have more runs than the shards, or those of another plan");
     add_quiet(*command, a->work);

@@ -110,6 +110,9 @@ void add_scene(py::module_& module) {
             "array of "
             "these.\nRaises Error where there is no such key or the value is out of range.")
         .def(
+            "_given", [](const SceneText& scene) { return text_of(scene.given()); },
+            "Returns the given keys alone, as a scene file in any folder.")
+        .def(
             "text", [](const SceneText& scene) { return text_of(scene.canonical()); },
             "Returns the whole scene as TOML, every key with its value, defaults included. Equal scenes have "
             "equal "
@@ -329,9 +332,12 @@ void add_simulation(py::module_& module) {
              "for "
              "n clouds.")
         .def("density", &LiveSimulation::density, "layer"_a = py::none(), py::call_guard<ReleasedLock>(),
-             "Returns the Density of a layer, or of all together: cld smoothed in space and time, as in "
-             "density files\n"
-             "without density.refine. Raises Error where clouds are drawn without one.")
+             "Returns the Density of a layer, or of all together: cld smoothed in space and time, where the "
+             "bits are. "
+             "Density\n"
+             "files without density.refine have the same, carried with the wind by a part of a cell to where "
+             "the air is\n"
+             "(docs/adr/0020-carried-frames.md). Raises Error where clouds are drawn without one.")
         .def(
             "picture",
             [](LiveSimulation& simulation) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <unistd.h>
-
 #include <pybind11/pybind11.h>
+#include <unistd.h>
 
 namespace nephos {
 

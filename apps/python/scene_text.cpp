@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/python/scene_text.h"
 
+#include <system_error>
 #include <utility>
 
 #include "core/error.h"
+#include "scenes/format/given_keys.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
 #include "scenes/format/writer.h"
@@ -41,9 +44,17 @@ SceneText SceneText::with(const std::string& setting) const {
 
 std::string SceneText::canonical() const { return to_toml(scene_); }
 
-// Frames are not made of it: they need not fit into the simulated time.
-void SceneText::read() {
-    scene_ = source_.read(settings_, SceneUse::without_frames);
+std::string SceneText::given() const {
+    Scene scene = scene_;
+    for_each_file(scene, [](const std::string&, FileKind, const std::filesystem::path& file) {
+        std::error_code error;
+        std::filesystem::path whole = std::filesystem::absolute(file, error);
+        return error ? file : whole;
+    });
+    return given_toml(scene);
 }
+
+// Frames are not made of it: they need not fit into the simulated time.
+void SceneText::read() { scene_ = source_.read(settings_, SceneUse::without_frames); }
 
 }  // namespace nephos

@@ -27,6 +27,8 @@ class SceneText {
     const Scene& scene() const { return scene_; }
     // Returns every key, defaults included, as canonical TOML.
     std::string canonical() const;
+    // Returns the given keys alone (scenes/format/given_keys.h), for a file in any folder.
+    std::string given() const;
 
   private:
     void read();

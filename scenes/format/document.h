@@ -112,7 +112,7 @@ class Document {
     std::deque<Origin> origins_;
 };
 
-// Texts of files with base models, by path.
+// Texts of files with base models, by absolute path.
 using ModelTexts = std::map<std::string, std::string>;
 
 // Reads the key `models`, base models from other scene files: inserts the [[model]] tables of the files that

@@ -82,12 +82,15 @@ class ModelFiles {
     }
 
     const std::string& text_of(const fs::path& path) {
-        const auto known = texts_.find(path.string());
-        if (known != texts_.end()) return known->second;
+        // Where it is named by an option, it is another file in another current folder.
         std::error_code error;
+        const fs::path whole = fs::absolute(path, error);
+        const std::string key = error ? path.string() : whole.lexically_normal().string();
+        const auto known = texts_.find(key);
+        if (known != texts_.end()) return known->second;
         const fs::file_status status = fs::status(path, error);
         if (fs::is_character_file(status) || fs::is_block_file(status)) require_regular_file(path);  // throws
-        return texts_[path.string()] = read_text_file(path, kMaxSceneBytes);
+        return texts_[key] = read_text_file(path, kMaxSceneBytes);
     }
 
     ModelFile read(const fs::path& path, const fs::path& requested) {

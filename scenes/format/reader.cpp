@@ -236,6 +236,7 @@ Scene scene_of_text(std::string_view text, const std::string& label, const std::
     } catch (const Error& error) {
         throw_problem(label, error.what(), {});
     }
+    scene.given.root = std::make_shared<const Node>(std::move(document.root));
     return scene;
 }
 
@@ -244,7 +245,7 @@ Scene scene_of_text(std::string_view text, const std::string& label, const std::
 struct SceneSource::Texts {
     std::string scene, label;
     std::filesystem::path folder;
-    std::mutex mutex;
+    std::mutex mutex;  // of `models`
     ModelTexts models;
 };
 
@@ -259,8 +260,15 @@ SceneSource::SceneSource(std::string text, std::string label, std::filesystem::p
 }
 
 Scene SceneSource::read(std::span<const std::string> overrides, SceneUse use) const {
+    ModelTexts models;
+    {
+        const std::scoped_lock lock(texts_->mutex);
+        models = texts_->models;
+    }
+    Scene scene = scene_of_text(texts_->scene, texts_->label, texts_->folder, overrides, use, models);
     const std::scoped_lock lock(texts_->mutex);
-    return scene_of_text(texts_->scene, texts_->label, texts_->folder, overrides, use, texts_->models);
+    texts_->models.merge(models);
+    return scene;
 }
 
 Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides, SceneUse use) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -59,6 +60,14 @@ struct FilePlaces {
     bool operator==(const FilePlaces&) const { return true; }
 };
 
+struct Node;
+
+// The keys that the scene was given (given_keys.h); none where it was made without a text. Scenes that differ in it are equal.
+struct GivenKeys {
+    std::shared_ptr<const Node> root;
+    bool operator==(const GivenKeys&) const { return true; }
+};
+
 struct Scene {
     std::string name;  // base name of output files; letters, digits, '-', '_' and '.'
     // True: the density repeats along x and y. Lattices are periodic over one common rectangle, clouds re-enter it where
@@ -82,6 +91,7 @@ struct Scene {
     std::vector<SunKey> sun_path;  // key frames of render.sun, which then has no date; empty: none
     FrameOptions frames;
     FilePlaces file_places;
+    GivenKeys given;
     bool operator==(const Scene&) const = default;
 };
 

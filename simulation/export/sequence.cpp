@@ -106,7 +106,8 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
             throw Error(ErrorCode::usage,
                         file.string() + ": its number does not follow that of the file before");
         next = number + 1;
-        if (is_wanted(options, number, least)) s.frames.push_back({file, number, 0, {}, file_stamp(file), {}});
+        if (is_wanted(options, number, least))
+            s.frames.push_back({file, number, 0, {}, file_stamp(file), {}});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, "no file has a number of this range");
     read_first(options, s);

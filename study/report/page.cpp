@@ -124,7 +124,8 @@ std::string what_was_run(const ReportData& data) {
            fmt::format(
                "<details><summary>The plan, <code>sweep.toml</code></summary><pre>{}</pre></details>\n"
                "<details><summary>The scene, <code>scene.toml</code></summary><pre>{}</pre></details>\n",
-               html(plan.to_toml()), html(plan.scene_text_in(options.scene_file.parent_path())));
+               html(plan.to_toml_in(options.scene_file.parent_path())),
+               html(plan.scene_text_in(options.scene_file.parent_path())));
 }
 
 std::string regimes(const ReportData& data) {

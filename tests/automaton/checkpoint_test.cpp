@@ -225,8 +225,19 @@ TEST(AtomicFile, KeepsThePermissionsOfTheFileThatItReplaces) {
         EXPECT_EQ(permissions("file"), mode);
         fs::remove(folder / "file");
     }
-    write_atomically(folder / "private", "new", Access::owner);
+    AtomicFile(folder / "private", Access::owner).publish();
     EXPECT_EQ(permissions("private"), fs::perms(0600));
+    // What another user put there says nothing where others may write.
+    fs::permissions(folder.path(), fs::perms(0777));
+    write_atomically(folder / "theirs", "old");
+    fs::permissions(folder / "theirs", fs::perms(0666));
+    if (::chown((folder / "theirs").c_str(), 12345, gid_t(-1)) != 0)
+        GTEST_SKIP() << "only root can make a file of another user";
+    write_atomically(folder / "theirs", "new");
+    struct stat status {};
+    ASSERT_EQ(::stat((folder / "theirs").c_str(), &status), 0);
+    EXPECT_EQ(status.st_uid, ::geteuid());
+    EXPECT_EQ(status.st_mode & S_IWOTH, 0u);
 }
 
 // Others who may write into the folder see the name of the temporary file once it is there: a link that they put in

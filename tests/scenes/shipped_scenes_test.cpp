@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include "scenes/format/given_keys.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/writer.h"
 #include "simulation/memory.h"
@@ -41,6 +42,9 @@ TEST(ShippedScenes, LoadAndKeepTheirMeaning) {
         EXPECT_NO_THROW(check(scene.automaton));
         const std::string text = to_toml(scene);
         EXPECT_EQ(read_scene_text(text, "again.toml"), scene) << text;
+        const std::string given = given_toml(scene);
+        EXPECT_EQ(read_scene_text(given, "again.toml"), scene) << given;
+        EXPECT_EQ(given_toml(read_scene_text(given, "again.toml")), given);
         EXPECT_GT(frame_count(scene), 0);
         EXPECT_FALSE(scene.automaton.field.ellipsoids.empty() && scene.automaton.field.scatters.empty() &&
                      scene.layers.empty());

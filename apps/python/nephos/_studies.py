@@ -2,12 +2,14 @@
 """Sweeps and fits from Python: the `nephos` command does them, in processes of its own, so that tables have the same bytes
 however they were asked for."""
 
+import contextlib
 import csv
 import json
 import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import tempfile
 
@@ -15,7 +17,6 @@ import numpy
 
 from ._nephos import Error, Scene, _toml_text
 
-_FILE_KEYS = ("initial_state", "files", "file", "textures", "height_map")
 _WORDS = ("run", "status", "regime", "state_hash", "message", "command")
 
 
@@ -45,10 +46,11 @@ def _call(arguments, allowed=(0,), plan=None):
     try:
         message = process.communicate()[1].strip()
     except BaseException as error:
-        # Ctrl-C reached it too; it keeps what is done, and its arguments must stay until it has ended.
-        if not isinstance(error, KeyboardInterrupt):
-            process.terminate()
-        process.communicate()
+        # What is done is kept; its arguments must stay until it has ended.
+        process.send_signal(signal.SIGINT if isinstance(error, KeyboardInterrupt) else signal.SIGTERM)
+        with contextlib.suppress(ValueError):  # the pipe was read to its end before
+            process.communicate()
+        process.wait()
         raise
     if process.returncode not in allowed:
         code = {1: "check", 2: "usage", 3: "io", 4: "gpu"}.get(process.returncode, "io")
@@ -135,12 +137,6 @@ def _folder(path):
     return path
 
 
-def _placed(keys, values):
-    """Names of files are seen from the current folder, and not from that of the plan, which is temporary."""
-    names_file = any(re.sub(r"(\[\d*\])?\s*$", "", key.rsplit(".", 1)[-1]) in _FILE_KEYS for key in keys)
-    return [os.path.abspath(value) if names_file and isinstance(value, (str, os.PathLike)) else value for value in values]
-
-
 def _plan(axes, options):
     lines = [f"{key} = {_toml_text(value)}" for key, value in options.items() if value is not None]
     for key, values in axes.items():
@@ -154,7 +150,7 @@ def _plan(axes, options):
             entries = ", ".join(f"{entry} = {_toml_text(value)}" for entry, value in values.items())
             text = "{ " + entries + " }"
         else:
-            text = _toml_text(_placed(keys, values))
+            text = _toml_text(values)
         lines += ["", "[[axis]]", f"keys = {_toml_text(keys)}", f"{name} = {text}"]
     return "\n".join(lines) + "\n"
 
@@ -182,13 +178,15 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
     out = _folder(out)
     options = {"scene": "scene.toml", "design": design, "points": points, "replicates": replicates, "seed": seed,
                "seeds": seeds, "clouds_every": clouds_every, "tracks": tracks or None, "layer": layer}
+    with contextlib.suppress(OSError):  # without a current folder only names of files need one
+        options["folder"] = os.getcwd()
     rules = {"min": steps[0], "max": steps[1]}
     if until is not None:
         rules["until"] = {"statistic": until[0], "standard_error": until[1]}
     options["steps"] = rules
     with tempfile.TemporaryDirectory(prefix="nephos-") as folder:
         if isinstance(scene, Scene):
-            pathlib.Path(folder, "scene.toml").write_text(scene.text(), encoding="utf-8")
+            pathlib.Path(folder, "scene.toml").write_text(scene._given(), encoding="utf-8")
         else:
             options["scene"] = os.path.abspath(scene)
         plan = pathlib.Path(folder, "sweep.toml")

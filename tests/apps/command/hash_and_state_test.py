@@ -2,6 +2,8 @@
 """`nephos hash` and `nephos state`."""
 
 import json
+import os
+import pathlib
 import unittest
 
 from case import Case, rows_of, SCENE, SOURCE, voxels
@@ -30,6 +32,14 @@ class Hash(Case):
 
 
 class State(Case):
+    def test_what_is_read_is_not_replaced(self):
+        text = pathlib.Path(self.scene).read_text()
+        self.refused(2, "state", self.scene, "--steps", "1", "--out", os.path.relpath(self.scene, self.folder), says="is the file that is read")
+        report = self.write("report.txt", "METAR LOWW 241250Z 30012KT 9999 FEW040 12/05 Q1020\n")
+        self.refused(2, "metar", f"@{report}", "--scene", report, says="is the file that is read")
+        self.assertEqual(pathlib.Path(self.scene).read_text(), text)
+        self.assertIn("LOWW", pathlib.Path(report).read_text())
+
     def test_state_goes_round(self):
         all_steps = self.hashes(self.scene, "--steps", "6").splitlines()
         result = self.call("state", self.scene, "--steps", "6", "--out", "state.vdb")

@@ -243,6 +243,19 @@ class Branch(Case):
         (self.folder / "copy/checkpoint.nephos").unlink()
         self.refused(2, "run", "--no-render", "--out", "copy", "--resume", says="left no checkpoint of its own")
 
+    def test_keys_that_follow_others_do_so_in_a_branch(self):
+        scene = SOURCE / "scenes/rain.toml"  # whose layer has the common field
+        small = ("--set", "frames.enabled=false")
+        self.call("run", scene, *small, "--no-render", "--set", "time.steps=5", "--out", "source")
+        branch = ("--from", "source", "--no-render", "--set", "time.steps=20")
+        hashes = []
+        for out, given in (("with", (scene, *small, "--set", "field.background.ext=0.5")), ("without", ("--set", "field.background.ext=0.5")),
+                           ("same", ())):
+            self.call("run", *given, *branch, "--out", out)
+            hashes.append(rows_of(self.folder / out / "statistics.csv")[-1]["hash"])
+        self.assertEqual(hashes[0], hashes[1])
+        self.assertNotEqual(hashes[0], hashes[2])
+
     def test_frames_of_other_times(self):
         """Numbers go on from those of the other run; where that would leave out frames, or ask for some before the branch."""
         scene = self.write("tiny.toml", LONG.replace("steps = 10000", "steps = 20"))

@@ -359,6 +359,35 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
         self.assertIn('"before": 2', self.call("sweep", "moved/a.toml", *sweep, "--out", "moved/o", "--json").stdout)
         self.assertEqual((self.folder / "moved/o/scene.toml").read_text(), text)
 
+    def test_the_scene_in_the_folder_is_that_of_the_runs(self):
+        """Keys that follow others do so there, too: fields of layers, boxes of scatters and motions, either form of a wind."""
+        scatter = NULL.replace("[64, 64, 10]", "[32, 32, 8]") + (
+            "[[field.scatters]]\ncount = 6\nz_m = 200\nsemi_axis_x_m = [100, 300]\nsemi_axis_y_m = 200\nsemi_axis_z_m = 150\n"
+            "centre = { hum = 0.2, act = 0.02, ext = 0.05 }\nrim = { hum = 0.0, act = 0.001, ext = 0.1 }\n")
+        wind = NULL.replace('initial = "empty"\n', "") + "[[wind]]\nlevels = [{ height_m = 0, from_deg = 200, speed_m_per_s = 4 }]\n"
+        swirl = NULL + '[[wind_field]]\nkind = "vortex"\nx_m = 800\ny_m = 800\nradius_m = 300\nspeed_m_per_s = 20\n'
+        for name, text, axis in (("layers", None, "field.background.ext=0.05,0.4"),
+                                 ("scatter", scatter, "lattice.cells=[32,32,8],[64,64,8]"),
+                                 ("wind", wind, "wind[0].levels[0].speed_m_per_s=3,9"),
+                                 ("swirl", swirl, "lattice.cell_size_m=50,80")):
+            with self.subTest(name):
+                scene = self.write(f"{name}.toml", text) if text else SOURCE / "scenes/rain.toml"
+                self.call("sweep", scene, "--axis", axis, "--replicates", "1", "--steps", "30", "--out", name)
+                tables = self.tables(name)
+                runs = rows(self.folder / name / "runs.csv")
+                self.assertNotEqual(runs[0]["state_hash"], runs[1]["state_hash"])
+                self.call("sweep", f"{name}/sweep.toml", "--out", f"{name}-again")
+                again = rows(self.folder / f"{name}-again/runs.csv")
+                self.assertEqual([(r["run"], r["state_hash"]) for r in again], [(r["run"], r["state_hash"]) for r in runs])
+                self.call("merge", name)
+                self.call("report", name)
+                self.assertEqual(self.tables(name), tables)
+                key, values = axis.split("=")
+                value = values[values.index("],") + 2:] if "[" in values else values.partition(",")[2]
+                hashes = [self.hashes(place, "--steps", "30", "--seed", runs[1]["seed"], "--set", f"{key}={value}")
+                          for place in (scene, f"{name}/scene.toml")]
+                self.assertEqual(*hashes)
+
     def test_files_as_values_of_an_axis(self):
         states = {}
         for name, seed in (("a.vdb", 1), ("b.vdb", 2)):
@@ -390,45 +419,82 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
         plan = self.write("data/plan.toml", 'scene = "s.toml"\nreplicates = 1\n[steps]\nmin = 20\nmax = 20\n[[axis]]\n'
                           'key = "lattice.initial_state"\nvalues = ["a.vdb", "b.vdb"]\n')
         self.assertIn('"before": 2', self.call("sweep", plan, "--out", out, "--json").stdout)
+        # The files may be anywhere: what is in them is what counts.
+        data.rename(self.folder / "moved")
+        self.assertIn('values = ["../a.vdb", "../b.vdb"]', (self.folder / "moved/o/sweep.toml").read_text())
+        self.assertIn('"before": 2', self.call("sweep", "moved/o/sweep.toml", "--out", "moved/o", "--json").stdout)
+        self.assertEqual([run["run"] for run in rows(self.folder / "moved/o/runs.csv")], [run["run"] for run in runs])
+        (self.folder / "moved").rename(data)
+        (self.folder / "below").mkdir()
+        self.folder = home / "below"
+        self.assertIn('"before": 2', self.call("sweep", "../data/s.toml", "--axis", "lattice.initial_state=../data/a.vdb,../data/b.vdb", *rest,
+                                               "../data/o", "--json").stdout)
+        self.folder = home
         # Another content under the same name is another run.
         (data / "b.vdb").write_bytes(states["a.vdb"])
+        self.refused(2, "sweep", "--quiet", scene, "--axis", axis, *rest, out, says="has the content of value 1")
+        self.call("state", scene, "--steps", "9", "--out", data / "b.vdb")
         self.assertIn('"before": 1', self.call("sweep", scene, "--axis", axis, *rest, out, "--json").stdout)
         again = rows(self.folder / out / "runs.csv")
         self.assertEqual(again[0]["run"], runs[0]["run"])
         self.assertNotEqual(again[1]["run"], runs[1]["run"])
         self.assertNotEqual(again[1]["state_hash"], runs[1]["state_hash"])
-        for status, key, says in ((2, "lattice.initial_state=data/a.vdb,data/./a.vdb", "expected each value once"),
-                                  (2, "lattice={cells=[8,8,8],initial_state='data/a.vdb'}", "expected an absolute path"),
-                                  (2, "models=['m.toml']", "are not an axis")):
+        for key, says in (("lattice.initial_state=data/a.vdb,data/./a.vdb", "expected each value once"),
+                          ("lattice={cells=[64,64,10],initial_state='data/a.vdb'}", "expected `lattice.initial_state` itself as an axis"),
+                          ("models=['m.toml']", "are not an axis")):
             with self.subTest(axis=key):
-                self.refused(status, "sweep", scene, "--axis", key, *rest, "no", says=says)
+                self.refused(2, "sweep", scene, "--axis", key, *rest, "no", says=says)
         missing = self.call("sweep", scene, "--axis", "lattice.initial_state=data/a.vdb,data/c.vdb", *rest, "no", status=3)
-        self.assertIn(f"{data.resolve()}/c.vdb: No such file", missing.stderr)
+        self.assertIn(f"{data.resolve()}/c.vdb: ", missing.stderr)
         self.assertFalse((self.folder / "no").exists())
 
-    def meanwhile(self, out, act, *sweep):
-        """Begins a sweep, calls `act` when its first records are there, and returns its status and what it said."""
-        process = subprocess.Popen([NEPHOS, "sweep", *map(str, sweep), "--out", out, "-j", "1", "--quiet"], cwd=self.folder,
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.environment)
-        end = time.monotonic() + 60
-        while not any(path.stat().st_size > 1000 for path in (self.folder / out).glob("shards/*")):
+    def meanwhile(self, act, *arguments, records="shards/*.jsonl", least=0):
+        """Begins a sweep or fit, calls `act` when it has a file of records of `least` bytes, and returns its status and errors."""
+        process = subprocess.Popen([NEPHOS, *map(str, arguments), "-j", "1", "--quiet"], cwd=self.folder, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True, env=self.environment)
+        out, end = self.folder / arguments[-1], time.monotonic() + 60
+        while not any(path.stat().st_size >= least for path in out.glob(records)):
             self.assertLess(time.monotonic(), end)
             self.assertIsNone(process.poll())
-            time.sleep(0.005)
+            time.sleep(0.002)
         act()
-        _, errors = process.communicate(timeout=120)
+        _, errors = process.communicate(timeout=200)
         return process.returncode, errors
 
     def test_a_scene_that_is_edited_meanwhile(self):
         """The runs are those of the scene that the sweep began with, and so are the waves of a fit."""
+        changed = NULL.replace("act = 0.002", "act = 0.02")
         scene = pathlib.Path(self.write("scenes/edited.toml", NULL))
-        sweep = (scene, "--axis", "field.background.ext=0.1..0.4:8", "--replicates", "4", "--steps", "1500..1500")
-        self.call("sweep", *sweep, "--out", "calm")
-        status, errors = self.meanwhile("edited", lambda: scene.write_text(NULL.replace("act = 0.002", "act = 0.02")), *sweep)
-        self.assertEqual((status, errors), (0, ""))
+        sweep = ("sweep", scene, "--axis", "field.background.ext=0.1..0.4:8", "--replicates", "4", "--steps", "1500..1500", "--out")
+        self.call(*sweep, "calm")
+        self.assertEqual(self.meanwhile(lambda: scene.write_text(changed), *sweep, "edited"), (0, ""))
         self.assertEqual(self.tables("edited"), self.tables("calm"))
         # What it is now is another sweep.
-        self.assertIn('"before": 0', self.call("sweep", *sweep, "--out", "edited", "--json").stdout)
+        self.assertIn('"before": 0', self.call(*sweep, "edited", "--json").stdout)
+        scene.write_text(NULL)
+        fit = self.write("fit.toml", """\
+scene = "scenes/edited.toml"
+runs = 16
+clouds_every = 0
+[steps]
+min = 400
+max = 1600
+[[parameter]]
+key = "field.background.ext"
+prior = { from = 0.05, to = 0.4, scale = "log" }
+[[target]]
+statistic = "cover"
+value = 0.15
+sd = 0.05
+""")
+        self.call("fit", fit, "--out", "calm-fit")
+        self.assertEqual(self.meanwhile(lambda: scene.write_text(changed), "fit", fit, "--out", "edited-fit", records="wave-1/shards/*.jsonl"),
+                         (0, ""))
+        for name in ("fit.json", "posterior.csv", "fitted.toml"):
+            self.assertEqual((self.folder / "edited-fit" / name).read_bytes(), (self.folder / "calm-fit" / name).read_bytes())
+        mine = self.write("own-fit/fitted.toml", "mine")
+        self.refused(2, "fit", fit, "--out", "own-fit", "--quiet", says="own-fit/fitted.toml: is there, but a fit did not write it")
+        self.assertEqual(pathlib.Path(mine).read_text(), "mine")
 
     def test_a_file_that_is_exchanged_meanwhile(self):
         for name, hum in (("a.vdb", 0.1), ("b.vdb", 0.9)):
@@ -436,15 +502,15 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
         data = self.folder / "data.vdb"
         shutil.copy(self.folder / "a.vdb", data)
         scene = self.write("started.toml", NULL.replace('initial = "empty"', 'initial_state = "data.vdb"'))
-        sweep = (scene, "--axis", "field.background.ext=0.1..0.4:8", "--replicates", "4", "--steps", "1500..1500")
-        self.call("sweep", *sweep, "--out", "calm")
-        status, errors = self.meanwhile("exchanged", lambda: os.replace(self.folder / "b.vdb", data), *sweep)
+        sweep = ("sweep", scene, "--axis", "field.background.ext=0.1..0.4:8", "--replicates", "16", "--steps", "1500..1500", "--out")
+        self.call(*sweep, "calm", "-j", "2")
+        status, errors = self.meanwhile(lambda: os.replace(self.folder / "b.vdb", data), *sweep, "exchanged", least=1000)
         self.assertEqual(status, 3)
         self.assertIn("data.vdb: was changed after the sweep began", errors)
+        self.assertIn(",", (self.folder / "exchanged/timing.csv").read_text())
         shutil.copy(self.folder / "a.vdb", data)
-        result = json.loads(self.call("sweep", *sweep, "--out", "exchanged", "--json").stdout)
-        self.assertEqual((result["done"], result["failed"]), (32, 0))
-        self.assertGreater(result["before"], 0)
+        # A name more, and other rights, make no other file.
+        self.assertEqual(self.meanwhile(lambda: (os.link(data, self.folder / "backup.vdb"), data.chmod(0o600)), *sweep, "exchanged"), (0, ""))
         self.assertEqual(self.tables("exchanged"), self.tables("calm"))
 
     def test_files_of_others_are_not_replaced(self):
@@ -469,6 +535,14 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
         for name in ("runs.csv", "points.csv", "failures.csv", "tracks.csv", "series.nc"):
             self.write(f"tables-{name}/{name}", "mine")
             self.refused(2, "sweep", "--quiet", self.null, *axis, f"tables-{name}", says=f"{name}: is there")
+        self.write("scripts/Snakefile", "mine")
+        self.refused(2, "sweep", "--quiet", self.null, *axis, "scripts", "--emit", "snakemake", says="Snakefile: is there")
+        shards = self.write("parts/shards/0.tar", "mine")  # a folder of that name says nothing
+        self.write("parts/scene.toml", "mine")
+        self.refused(2, "sweep", "--quiet", self.null, *axis, "parts", says="scene.toml: is there")
+        self.assertEqual(pathlib.Path(shards).read_text(), "mine")
+        self.refused(2, "sweep", self.null, *axis, "", says="expected the path of a folder")
+        self.refused(2, "sweep", self.null, *axis, "both", "--emit", "slurm", "--shard", "0/2", says="leave out --shard")
         # What a sweep left is its own: with and without records, and a plan that was made only.
         self.call("merge", "swept", "--out", "tables")
         for folder in ("swept", "tables"):
@@ -476,6 +550,12 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
         self.call("sweep", self.null, *axis, "planned", "--emit", "slurm")
         shutil.rmtree(self.folder / "planned/shards")
         self.call("sweep", self.null, *axis, "planned")
+        for left in (("scene.toml",), ("scene.toml", "sweep.toml", "runs.csv"), ("scene.toml", "sweep.toml", "runs.csv", "points.csv")):
+            shutil.rmtree(self.folder / "half", ignore_errors=True)
+            (self.folder / "half").mkdir()
+            for name in left:
+                shutil.copy(self.folder / "tables" / name, self.folder / "half" / name)
+            self.call("merge", "swept", "--out", "half")
 
     def test_a_grown_axis_computes_only_what_is_new(self):
         self.sweep("grown", "-j", "2", axis="field.background.ext=0.2,0.05")

@@ -447,24 +447,52 @@ class Threads(Case):
 
     def test_an_exception_ends_a_sweep(self):
         """Whatever a handler raises: no process stays that works without its arguments, and the same call goes on."""
+        out = self.folder / "out"
+
         def stop(*_):
-            raise TimeoutError
+            if any(out.glob("shards/*.jsonl")):
+                signal.setitimer(signal.ITIMER_REAL, 0)
+                raise TimeoutError
 
         def sweep():
-            return nephos.sweep(nephos.Scene(self.scene), {"field.background.ext": [0.1, 0.2]}, self.folder / "out", replicates=4,
+            return nephos.sweep(nephos.Scene(self.scene), {"field.background.ext": [0.1, 0.2]}, out, replicates=20,
                                 steps=(2000, 2000), clouds_every=0, workers=1)
 
         before = signal.signal(signal.SIGALRM, stop)
         try:
-            signal.setitimer(signal.ITIMER_REAL, 0.3)
+            signal.setitimer(signal.ITIMER_REAL, 0.02, 0.02)
             with self.assertRaises(TimeoutError):
                 sweep()
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
             signal.signal(signal.SIGALRM, before)
-        self.assertFalse(os.path.exists(f"/proc/{os.getpid()}/task/{os.getpid()}/children") and
-                         pathlib.Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().strip())
-        self.assertEqual(list(sweep().runs()["status"]), ["done"] * 8)
+        children = pathlib.Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
+        self.assertEqual(children, [])
+        self.assertEqual(list(sweep().runs()["status"]), ["done"] * 40)
+
+    def test_files_are_those_of_the_current_folder(self):
+        """Of models, wherever it is when a key is set; of values of an axis."""
+        home = os.getcwd()
+        scene = nephos.Scene.from_text("[lattice]\ncells = [8, 8, 8]\n")
+        for name in ("Cb", "Ac"):
+            (self.folder / name).mkdir()
+            shutil.copy(SOURCE / f"scenes/genera/{name}.toml", self.folder / name / "m.toml")
+        try:
+            texts = []
+            for name in ("Cb", "Ac"):
+                os.chdir(self.folder / name)
+                texts.append(scene.set("models", ["m.toml"]).text())
+                self.assertIn(f'name = "{name}"', texts[-1])
+            os.chdir(self.folder)
+            self.call("state", self.scene, "--steps", "1", "--out", "state.vdb")
+            sweep = nephos.sweep(nephos.Scene(self.scene), {"lattice.initial_state": ["state.vdb"]}, "out", replicates=1,
+                                 steps=(20, 20))
+            self.assertEqual(list(sweep.runs()["status"]), ["done"])
+        finally:
+            os.chdir(home)
+        self.assertNotEqual(*texts)
+        with self.assertRaisesRegex(nephos.Error, "has no name"):
+            nephos.sweep(scene, {}, "")
 
     def test_a_program_ends_while_its_daemons_work(self):
         # Python takes the interpreter from them where they come back from the engine.
