@@ -30,9 +30,8 @@ bool begins_with(const fs::path& file, std::string_view text) {
     }
 }
 
-bool is_of(const fs::path& json, std::string_view format) {
-    return begins_with(json, fmt::format("{{\n  \"format\": \"{}\"", format));
-}
+constexpr std::string_view kSweepManifest = "{\n  \"format\": \"nephos sweep\"",
+                           kFit = "{\n  \"format\": \"nephos fit\"";
 
 void require_absent(const fs::path& file, std::string_view by) {
     if (!is_there(file)) return;
@@ -50,21 +49,21 @@ void require_own(const fs::path& file, std::string_view beginning, std::string_v
 
 void require_sweep_folder(const fs::path& folder) {
     constexpr std::string_view kSweep = "a sweep";
+    require_own(folder / "manifest.json", kSweepManifest, kSweep);
     if (has_shards(folder)) return;  // also of a version that marked nothing
     require_own(folder / "scene.toml", kWrittenBySweep, kSweep);
     require_own(folder / "sweep.toml", kWrittenBySweep, kSweep);
     require_own(folder / "timing.csv", "shard,shards,", kSweep);
-    if (is_of(folder / "manifest.json", "nephos sweep")) return;
-    require_absent(folder / "manifest.json", kSweep);
+    if (is_there(folder / "manifest.json")) return;  // the last of the tables
     require_own(folder / "runs.csv", "run,point,replicate,", kSweep);
-    if (is_there(folder / "runs.csv")) return;  // the first of the tables
+    if (is_there(folder / "runs.csv")) return;  // the first of them
     for (const char* name : {"points.csv", "failures.csv", "tracks.csv", "series.nc"})
         require_absent(folder / name, kSweep);
 }
 
 void require_fit_folder(const fs::path& folder) {
     for (const char* part : {"wave-1", "wave-2", "wave-3", "proof"}) require_sweep_folder(folder / part);
-    if (has_shards(folder / "wave-1") || is_of(folder / "fit.json", "nephos fit")) return;
+    if (has_shards(folder / "wave-1") || begins_with(folder / "fit.json", kFit)) return;
     for (const char* name : {"fit.json", "fitted.toml", "posterior.csv"})
         require_absent(folder / name, "a fit");
 }

@@ -3,10 +3,14 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "scenes/format/document.h"
 #include "scenes/format/named_files.h"
@@ -45,7 +49,10 @@ void set_text(Node& node, std::string text) {
     node.text = std::move(text);
 }
 
+// Integers of TOML have 63 bits; a larger seed is a text.
 void set_integer(Node& node, std::uint64_t number) {
+    if (number > std::uint64_t(std::numeric_limits<std::int64_t>::max()))
+        return set_text(node, fmt::format("{:#x}", number));
     node.kind = Node::Kind::integer;
     node.integer = std::int64_t(number);
 }

@@ -271,6 +271,14 @@ class Branch(Case):
         self.assertEqual(sorted(path.name for path in (self.folder / "good/density").iterdir()),
                          [f"tiny_{n:04}.vdb" for n in (6, 7, 8)])
 
+    def test_a_large_seed_is_kept(self):
+        seed = ("--seed", str(2**64 - 1))
+        self.call("run", self.scene, *seed, "--no-render", "--out", "source")
+        self.call("run", "--resume", "--no-render", "--out", "source")
+        self.call("run", "--from", "source", "--no-render", "--set", "time.steps=9", "--out", "branch")
+        self.call("run", self.scene, *seed, "--no-render", "--set", "time.steps=9", "--out", "whole")
+        self.assertEqual(*((self.folder / name / "statistics.csv").read_bytes() for name in ("branch", "whole")))
+
     def test_a_run_goes_on_with_its_own_scene(self):
         self.call("run", self.scene, "--no-render", "--out", "whole")
         self.call("run", self.scene, "--no-render", "--out", "part", "--set", "time.steps=3")

@@ -530,6 +530,10 @@ sd = 0.05
         manifest = (self.folder / "run/manifest.json").read_bytes()
         self.refused(2, "sweep", "--quiet", self.null, *axis, "run", says="run/manifest.json: is there")
         self.call("sweep", self.null, *axis, "swept")
+        self.call("run", self.null, "--statistics-only", "--set", "time.steps=2", "--out", "swept", "--overwrite")
+        self.refused(2, "sweep", "--quiet", self.null, *axis, "swept", says="swept/manifest.json: is there")
+        shutil.rmtree(self.folder / "swept")
+        self.call("sweep", self.null, *axis, "swept")
         self.refused(2, "merge", "swept", "--out", "run", says="run/manifest.json: is there")
         self.assertEqual((self.folder / "run/manifest.json").read_bytes(), manifest)
         for name in ("runs.csv", "points.csv", "failures.csv", "tracks.csv", "series.nc"):
