@@ -53,7 +53,10 @@ void require_sweep_folder(const fs::path& folder) {
     if (has_shards(folder)) return;  // also of a version that marked nothing
     require_own(folder / "scene.toml", kWrittenBySweep, kSweep);
     require_own(folder / "sweep.toml", kWrittenBySweep, kSweep);
-    require_own(folder / "timing.csv", "shard,shards,", kSweep);
+    // What else stands there is refused by whoever opens it.
+    std::error_code error;
+    if (fs::is_regular_file(fs::symlink_status(folder / "timing.csv", error)))
+        require_own(folder / "timing.csv", "shard,shards,", kSweep);
     if (is_there(folder / "manifest.json")) return;  // the last of the tables
     require_own(folder / "runs.csv", "run,point,replicate,", kSweep);
     if (is_there(folder / "runs.csv")) return;  // the first of them
