@@ -3,7 +3,9 @@
 
 #include <array>
 #include <charconv>
+#include <optional>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -13,6 +15,7 @@
 #include "core/math.h"
 #include "core/random.h"
 #include "density/combine.h"
+#include "scenes/format/errors.h"
 #include "scenes/format/given_keys.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
@@ -354,9 +357,16 @@ std::string read_scene_text_of(const std::filesystem::path& path) {
     const auto read = [&](const std::string& text, const char* name) {
         return read_scene_text(text, path.string() + name, {}, {}, SceneUse::without_frames);
     };
-    Scene scene = read(given.empty() ? canonical : given, given.empty() ? ": scene_text" : ": scene_given");
-    // Earlier versions have no given keys, and a program may have changed more than they show.
-    if (given.empty() || to_toml(scene) != canonical) {
+    // Earlier versions have no given keys, and a program may have changed more than they show: then the canonical text.
+    std::optional<Scene> as_given;
+    try {
+        if (!given.empty()) as_given = read(given, ": scene_given");
+    } catch (const SceneErrors&) {
+    }
+    Scene scene;
+    if (as_given && to_toml(*as_given) == canonical) {
+        scene = std::move(*as_given);
+    } else {
         scene = read(canonical, ": scene_text");
         scene.given = {};
     }

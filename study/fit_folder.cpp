@@ -12,8 +12,8 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "scenes/format/given_keys.h"
 #include "scenes/format/reader.h"
-#include "scenes/format/writer.h"
 
 namespace nephos {
 namespace {
@@ -99,7 +99,7 @@ void write_results(const FitOptions& options, const FitResult& result, const std
             overrides.push_back(key + "=" + number_text(result.best[d]));
     write_atomically(
         folder / "fitted.toml",
-        to_toml(placed_scene(options.base.source->read(overrides, SceneUse::without_frames), folder)));
+        given_toml(placed_scene(options.base.source->read(overrides, SceneUse::without_frames), folder)));
 
     using Json = nlohmann::ordered_json;
     const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(); };

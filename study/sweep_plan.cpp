@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <span>
 #include <tuple>
@@ -113,6 +114,10 @@ void require_apart(const std::vector<Axis>& axes) {
 
 void check_options(const SweepOptions& options) {
     const auto fail = [](const std::string& message) { throw Error(ErrorCode::usage, message); };
+    constexpr std::uint64_t kLargestSeed =
+        std::numeric_limits<std::int64_t>::max();  // of the sweep's own file
+    if (options.seed > kLargestSeed)
+        fail(fmt::format("seed: {} is not from 0 to {}", options.seed, kLargestSeed));
     if (options.replicates < 1 || options.replicates > 100'000)
         fail(fmt::format("replicates: {} is not from 1 to 100,000", options.replicates));
     if (options.steps.min < 20 || options.steps.max < options.steps.min || options.steps.max > kMaxSteps)

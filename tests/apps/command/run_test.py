@@ -277,6 +277,12 @@ class Branch(Case):
         self.call("run", "--resume", "--no-render", "--out", "source")
         self.call("run", "--from", "source", "--no-render", "--set", "time.steps=9", "--out", "branch")
         self.call("run", self.scene, *seed, "--no-render", "--set", "time.steps=9", "--out", "whole")
+        self.call("sweep", self.scene, "--set", "seed='0xffffffffffffffff'", "--replicates", "1", "--steps", "20", "--out", "sweep")
+        self.call("merge", "sweep")
+        # A manifest whose given keys cannot be read has the canonical text.
+        manifest = self.folder / "source/manifest.json"
+        manifest.write_text(manifest.read_text().replace('"scene_given": "', '"scene_given": "seed = -1\\n'))
+        self.call("run", "--resume", "--no-render", "--out", "source")
         self.assertEqual(*((self.folder / name / "statistics.csv").read_bytes() for name in ("branch", "whole")))
 
     def test_a_run_goes_on_with_its_own_scene(self):

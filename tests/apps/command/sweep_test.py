@@ -546,6 +546,7 @@ sd = 0.05
         self.refused(2, "sweep", "--quiet", self.null, *axis, "parts", says="scene.toml: is there")
         self.assertEqual(pathlib.Path(shards).read_text(), "mine")
         self.refused(2, "sweep", self.null, *axis, "", says="expected the path of a folder")
+        self.refused(2, "sweep", self.null, "--seed", 2**63, *axis, "large", says="is not from 0 to 9223372036854775807")
         self.refused(2, "sweep", self.null, *axis, "both", "--emit", "slurm", "--shard", "0/2", says="leave out --shard")
         # What a sweep left is its own: with and without records, and a plan that was made only.
         self.call("merge", "swept", "--out", "tables")
