@@ -447,7 +447,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
                      : settings.branch ? branched_simulation(settings, folder)
                                        : Simulation(settings.scene, settings.range, settings.simulation_hash,
                                                     std::move(settings.initial), settings.results()));
-    // Of the layers, of the pictures and for the checksums files were read at different times.
+    // Refuses a mixture: the simulation, the pictures and the checksums read the files at different times.
     if (const auto changed = first_changed(settings.stamps))
         throw Error(ErrorCode::io,
                     changed->string() + ": was changed while the run began: give the same command again");

@@ -53,7 +53,7 @@ void require_sweep_folder(const fs::path& folder) {
     if (has_shards(folder)) return;  // also of a version that marked nothing
     require_own(folder / "scene.toml", kWrittenBySweep, kSweep);
     require_own(folder / "sweep.toml", kWrittenBySweep, kSweep);
-    // What else stands there is refused by whoever opens it.
+    // Leaves links and pipes to open_regular_file(), which refuses them with the reason.
     std::error_code error;
     if (fs::is_regular_file(fs::symlink_status(folder / "timing.csv", error)))
         require_own(folder / "timing.csv", "shard,shards,", kSweep);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What stands in the folder of a sweep or of a fit before anything is written into it.
+// Tells files that a sweep or fit wrote from those of others, before anything is written into their folder.
 
 #include <filesystem>
 #include <string_view>

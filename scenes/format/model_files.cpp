@@ -82,7 +82,7 @@ class ModelFiles {
     }
 
     const std::string& text_of(const fs::path& path) {
-        // Where it is named by an option, it is another file in another current folder.
+        // Keyed by the absolute path: a name in an option is relative to the current folder, which may change.
         std::error_code error;
         const fs::path whole = fs::absolute(path, error);
         const std::string key = error ? path.string() : whole.lexically_normal().string();

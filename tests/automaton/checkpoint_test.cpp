@@ -227,7 +227,7 @@ TEST(AtomicFile, KeepsThePermissionsOfTheFileThatItReplaces) {
     }
     AtomicFile(folder / "private", Access::owner).publish();
     EXPECT_EQ(permissions("private"), fs::perms(0600));
-    // What another user put there says nothing where others may write.
+    // Takes no permissions from a file that another user put into a folder open to all.
     fs::permissions(folder.path(), fs::perms(0777));
     write_atomically(folder / "theirs", "old");
     fs::permissions(folder / "theirs", fs::perms(0666));

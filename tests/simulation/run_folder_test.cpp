@@ -230,7 +230,7 @@ TEST_F(RunFolderTest, ResumingStatisticsStartsGoesOnAndSkips) {
         << "the key that differs";
 }
 
-// What was read for the bits, for the pictures and for the manifest is of one content, or there is no run.
+// Bits, pictures and checksums are of one content of each file, or there is no run.
 TEST_F(RunFolderTest, RefusesFilesThatChangeWhileItBegins) {
     const fs::path map = settings("maps").folder.parent_path() / "heights.raw";
     std::ofstream(map) << std::string(64, 'a');
