@@ -15,6 +15,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/paths.h"
 
 namespace nephos {
 namespace {
@@ -23,13 +24,12 @@ namespace {
     throw Error(ErrorCode::io, path.string() + ": " + what + ": " + std::strerror(error));
 }
 
-void flush_to_device(const std::filesystem::path& subject, const std::filesystem::path& reported, int flags) {
-    const Descriptor descriptor(::open(subject.c_str(), flags | O_CLOEXEC));
+void flush_file(const std::filesystem::path& file, const std::filesystem::path& reported) {
+    const Descriptor descriptor(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
     if (descriptor.get() < 0) fail(reported, "cannot open after writing", errno);
     int failed;
     do failed = ::fsync(descriptor.get());
     while (failed != 0 && errno == EINTR);
-    // Some file systems cannot flush a folder and say EINVAL; there the rename itself is all there is.
     if (failed != 0 && errno != EINVAL) fail(reported, "cannot flush to the device", errno);
 }
 
@@ -109,10 +109,8 @@ class PieceWriter {
 }  // namespace
 
 AtomicFile::AtomicFile(const std::filesystem::path& given, Access access) : path_(target_of(given)) {
-    std::error_code error;
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
-    std::filesystem::create_directories(folder, error);
-    if (error) fail(folder, "cannot create the folder", error.value());
+    create_folders(folder);
     create_temporary(folder, access);
 }
 
@@ -189,7 +187,7 @@ void AtomicFile::publish() {
     if (!is_created_file(status))
         throw Error(ErrorCode::io,
                     path_.string() + ": another file was put in the place of its temporary one");
-    flush_to_device(temporary_, path_, O_RDONLY | O_NOFOLLOW);
+    flush_file(temporary_, path_);
     if (permissions_ && *permissions_ != (status.st_mode & kPermissions)) {
         const Descriptor descriptor(::open(temporary_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
         if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0 || !is_created_file(status) ||
@@ -200,7 +198,7 @@ void AtomicFile::publish() {
     std::filesystem::rename(temporary_, path_, error);
     if (error) fail(path_, "cannot rename into place", error.value());
     published_ = true;
-    flush_to_device(temporary_.parent_path(), path_, O_RDONLY | O_DIRECTORY);
+    flush_folder(temporary_.parent_path(), path_);
 }
 
 void write_atomically(const std::filesystem::path& path,

@@ -15,7 +15,8 @@ std::int64_t nanoseconds(const timespec& time) {
 FileStamp file_stamp(const std::filesystem::path& path) noexcept {
     struct stat status = {};
     if (::stat(path.c_str(), &status) != 0) return {};
-    return {status.st_dev, status.st_ino, std::uint64_t(status.st_size), nanoseconds(status.st_mtim)};
+    return {status.st_dev, status.st_ino, std::uint64_t(status.st_size), nanoseconds(status.st_mtim),
+            status.st_mtim.tv_nsec == 0 ? nanoseconds(status.st_ctim) : 0};
 }
 
 std::optional<std::filesystem::path> first_changed(const FileStamps& stamps) {

@@ -14,7 +14,10 @@ namespace nephos {
 // milliseconds. All 0: there is no file that can be examined.
 struct FileStamp {
     std::uint64_t device = 0, inode = 0, bytes = 0;
-    std::int64_t written_ns = 0;  // mtime: a link more or other permissions make no other version
+    std::int64_t written_ns = 0;  // mtime
+    // ctime, which nobody can set, where mtime has no fraction of a second: archives and copies set that, one time for many
+    // files. Otherwise 0, as a link more or other permissions make no other version.
+    std::int64_t changed_ns = 0;
     bool operator==(const FileStamp&) const = default;
 };
 

@@ -10,15 +10,13 @@
 #include <sys/file.h>
 
 #include "core/error.h"
+#include "core/paths.h"
 
 namespace nephos {
 
 FolderLock::FolderLock(const std::filesystem::path& folder, std::string work)
     : path_(folder), work_(std::move(work)) {
-    std::error_code failed;
-    std::filesystem::create_directories(folder, failed);
-    if (failed)
-        throw Error(ErrorCode::io, folder.string() + ": cannot create the folder: " + failed.message());
+    create_folders(folder);
     folder_.reset(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (folder_.get() < 0) {
         const int error = errno;

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/paths.h"
 #include "scenes/format/text.h"
 #include "simulation/scene_files.h"
 
@@ -44,7 +45,7 @@ fs::path path_from(const fs::path& folder, const fs::path& file) {
 }
 
 fs::path path_of(const fs::path& folder, const fs::path& named) {
-    return named.is_absolute() ? named : (resolved(folder) / named).lexically_normal();
+    return named.is_absolute() ? named : normal_path(resolved(folder) / named);
 }
 
 std::vector<RunInput> inputs_of(const Scene& scene, const fs::path& folder, const InputUse& use) {

@@ -11,6 +11,7 @@
 
 #include "core/digest.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "scenes/format/named_files.h"
 #include "scenes/format/text.h"
 #include "simulation/scene_files.h"
@@ -35,7 +36,7 @@ fs::path absolute(const fs::path& folder, const fs::path& file) {
     std::error_code error;
     const fs::path whole = fs::absolute(folder / file, error);
     if (error) throw Error(ErrorCode::io, file.string() + ": there is no current folder: " + error.message());
-    return whole.lexically_normal();
+    return normal_path(whole);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <string>
 #include <system_error>
 
+#include "core/paths.h"
 #include "scenes/format/named_files.h"
 
 namespace nephos {
@@ -11,10 +12,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns the absolute path without "." and ".." and without a slash at its end.
-fs::path normal(const fs::path& path) {
-    const fs::path whole = fs::absolute(path).lexically_normal();
-    return whole.has_filename() ? whole : whole.parent_path();
+// Returns the absolute path with its links resolved, of what is there of it.
+fs::path resolved(const fs::path& path) {
+    const fs::path whole = normal_path(fs::absolute(path));
+    std::error_code error;
+    const fs::path found = fs::weakly_canonical(whole.has_filename() ? whole : whole.parent_path(), error);
+    return error ? whole : found;
 }
 
 // Returns whether two absolute paths have the same first folder below the root.
@@ -26,10 +29,12 @@ bool begin_alike(const fs::path& a, const fs::path& b) {
 }  // namespace
 
 fs::path placed_path(const fs::path& file, const fs::path& folder) {
-    const fs::path whole = normal(file), from = normal(folder);
-    std::error_code error;
-    const bool has_links = fs::weakly_canonical(from, error) != from;
-    return has_links || !begin_alike(whole, from) ? whole : whole.lexically_relative(from);
+    const fs::path named = normal_path(fs::absolute(file));
+    // A file that is a link keeps its own name.
+    const fs::path whole = resolved(named.parent_path()) / named.filename(), from = resolved(folder);
+    const fs::path placed = begin_alike(whole, from) ? whole.lexically_relative(from) : whole;
+    require_scene_name(placed);
+    return placed;
 }
 
 Scene placed_scene(Scene scene, const fs::path& folder) {

@@ -10,8 +10,8 @@
 namespace nephos {
 
 // Returns the scene with the names of its files as a text in `folder` has them: relative to the folder, so that both may
-// move together; absolute where the two have no folder in common but the root, or where the folder is reached through a
-// link, which makes ".." ambiguous. Neither the current folder nor the way in which the scene named them changes the result.
+// move together; absolute where the two have no folder in common but the root. Neither the current folder, nor the way in
+// which the scene named them, nor links on the way to the folder change the result. Throws Error(usage) where a name is no UTF-8.
 Scene placed_scene(Scene scene, const std::filesystem::path& folder);
 
 // The same for one file.

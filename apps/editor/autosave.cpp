@@ -16,6 +16,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
 
@@ -88,9 +89,7 @@ bool AutosaveFile::is_in_place() const { return is_open() && is_same_file(file_.
 
 void AutosaveFile::claim(const fs::path& folder, const std::string& name) {
     constexpr int kAttempts = 1000;
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error) fail(folder, "cannot create the folder", error.value());
+    create_folders(folder);
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
         const fs::path path = numbered(folder, name, attempt);
         // Readable by this user alone, as the scene may be private.

@@ -9,6 +9,7 @@
 
 #include "apps/editor/state.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "density/vdb/vdb_file.h"
 #include "render/image/alpha_image.h"
 #include "scenes/format/text.h"
@@ -101,7 +102,7 @@ std::string name_in_scene(const Editor& editor, const fs::path& path) {
     if (folder.empty()) folder = fs::current_path(error);
     const fs::path relative = fs::proximate(fs::absolute(path), fs::absolute(folder), error);
     const bool below = !error && !relative.empty() && *relative.begin() != "..";
-    return below ? relative.generic_string() : fs::absolute(path).lexically_normal().string();
+    return below ? relative.generic_string() : normal_path(fs::absolute(path)).string();
 }
 
 }  // namespace

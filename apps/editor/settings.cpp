@@ -12,6 +12,7 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/paths.h"
 
 namespace nephos {
 namespace {
@@ -86,7 +87,7 @@ void write_settings(const std::filesystem::path& folder, const Settings& setting
 }
 
 void note_recent(Settings& settings, const std::filesystem::path& path) {
-    const std::string name = std::filesystem::absolute(path).lexically_normal().string();
+    const std::string name = normal_path(std::filesystem::absolute(path)).string();
     std::erase(settings.recent, name);
     settings.recent.insert(settings.recent.begin(), name);
     if (settings.recent.size() > kMostRecent) settings.recent.resize(kMostRecent);

@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "core/descriptor.h"
+#include "core/paths.h"
 #include "scenes/format/document.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/schema_sections.h"
@@ -57,7 +58,7 @@ class ModelFiles {
     // too many files, or they are too large, which is reported as any other problem.
     bool add(const Node& name, const std::string& path_of_item, std::vector<Node>& models) {
         const bool in_file = document_.origin(name.place.origin).is_file;
-        const fs::path path = in_file ? (folder_ / name.text).lexically_normal() : fs::path(name.text);
+        const fs::path path = in_file ? normal_path(folder_ / name.text) : fs::path(name.text);
         auto found = files_.find(path.string());
         if (found == files_.end()) {
             if (files_.size() == kMostFiles) return refuse(name, path_of_item);
@@ -85,7 +86,7 @@ class ModelFiles {
         // Keyed by the absolute path: a name in an option is relative to the current folder, which may change.
         std::error_code error;
         const fs::path whole = fs::absolute(path, error);
-        const std::string key = error ? path.string() : whole.lexically_normal().string();
+        const std::string key = error ? path.string() : normal_path(whole).string();
         const auto known = texts_.find(key);
         if (known != texts_.end()) return known->second;
         const fs::file_status status = fs::status(path, error);

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
+#include "core/paths.h"
 #include "scenes/format/document.h"
 #include "scenes/format/text.h"
 
@@ -46,7 +48,7 @@ class Resolver {
         const Origin& origin = document_.origin(node.place.origin);
         if (!origin.is_file) return file;
         const fs::path from = node.place.origin == 0 ? folder_ : fs::path(origin.label).parent_path();
-        return (from / file).lexically_normal();
+        return normal_path(from / file);
     }
 
     Scene& scene_;
@@ -63,6 +65,15 @@ const Node* find(const Node* table, std::string_view name) {
 const Node* item(const Node* array, std::size_t n) { return array != nullptr ? &array->items[n] : nullptr; }
 
 }  // namespace
+
+void require_scene_name(const fs::path& file) {
+    const std::string text = file.string();
+    if (find_invalid_utf8(text) == text.size()) return;
+    throw Error(ErrorCode::usage,
+                text +
+                    ": its name is no UTF-8, which the text of a scene has to be: give the file, and the "
+                    "folders that it is in, other names");
+}
 
 void resolve_files(Scene& scene, const Document& document, const fs::path& folder) {
     Resolver resolver(scene, document, folder);

@@ -26,6 +26,9 @@ enum class FileKind {
 // Scene::file_places. `document`: that the scene was read from, without problems.
 void resolve_files(Scene& scene, const Document& document, const std::filesystem::path& folder);
 
+// Throws Error(usage) for the name of a file that no text of a scene can hold, as it is no UTF-8.
+void require_scene_name(const std::filesystem::path& file);
+
 // Calls use(key, kind, path) for each file, and takes the path that it returns. Each file of a list has its number:
 // "model[0].textures[1]".
 template <class Use>

@@ -185,18 +185,6 @@ std::string name_from(const std::filesystem::path& file) {
     throw SceneErrors(std::move(problems));
 }
 
-// Returns the folder of a file as texts may be put behind it, whose ".." are taken out of the text later: where that leads
-// elsewhere than the system goes, through a link, the folder without links.
-std::filesystem::path folder_of(const std::filesystem::path& file) {
-    const std::filesystem::path folder = file.parent_path();
-    if (std::ranges::find(folder, std::filesystem::path("..")) == folder.end()) return folder;
-    std::error_code error;
-    const std::filesystem::path shortened = folder.lexically_normal();
-    if (std::filesystem::equivalent(folder, shortened, error)) return folder;
-    const std::filesystem::path whole = std::filesystem::canonical(folder, error);
-    return error ? folder : whole;
-}
-
 // `models`: texts of files that were read before; those that are read now are added.
 Scene scene_of_text(std::string_view text, const std::string& label, const std::filesystem::path& folder,
                     std::span<const std::string> overrides, SceneUse use, ModelTexts& models) {
@@ -234,7 +222,10 @@ Scene scene_of_text(std::string_view text, const std::string& label, const std::
         check(scene.automaton);  // what this reader overlooked would otherwise pass validation and fail in
                                  // the run
     } catch (const Error& error) {
-        throw_problem(label, error.what(), {});
+        const Entry* field = document.root.find("field");
+        if (field == nullptr) throw_problem(label, error.what(), {});
+        document.report(field->value.place, error.what());
+        throw_problems(std::move(document.problems), label);
     }
     scene.given.root = std::make_shared<const Node>(std::move(document.root));
     return scene;
@@ -250,7 +241,10 @@ struct SceneSource::Texts {
 };
 
 SceneSource::SceneSource(const std::filesystem::path& path)
-    : SceneSource(read_text_file(path, kMaxSceneBytes), path.string(), folder_of(path)) {}
+    : SceneSource(read_text_file(path, kMaxSceneBytes), path) {}
+
+SceneSource::SceneSource(std::string text, const std::filesystem::path& path)
+    : SceneSource(std::move(text), path.string(), path.parent_path()) {}
 
 SceneSource::SceneSource(std::string text, std::string label, std::filesystem::path folder)
     : texts_(std::make_shared<Texts>()) {

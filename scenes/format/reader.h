@@ -41,6 +41,8 @@ class SceneSource {
   public:
     // Reads the file. Throws Error(io).
     explicit SceneSource(const std::filesystem::path& path);
+    // Takes what was read of the file `path`.
+    SceneSource(std::string text, const std::filesystem::path& path);
     SceneSource(std::string text, std::string label, std::filesystem::path folder);
 
     // As read_scene() and read_scene_text().

@@ -57,7 +57,8 @@ double SectionReader::number(std::string_view key, double otherwise) const {
     const Entry* entry = find(key);
     if (entry == nullptr) return otherwise;
     if (entry->value.kind == Node::Kind::integer) return double(entry->value.integer);
-    return entry->value.kind == Node::Kind::number ? entry->value.number : otherwise;
+    if (entry->value.kind != Node::Kind::number) return otherwise;
+    return entry->value.number == 0 ? 0.0 : entry->value.number;  // one zero only, as all other keys
 }
 
 void SectionReader::report(std::string_view key, std::string message, std::string expected) const {

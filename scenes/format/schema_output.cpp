@@ -395,6 +395,17 @@ const Section& ground_section() {
     return section;
 }
 
+// Sizes with a value of their own at 0.
+void finish_detail(const SectionReader& reader, void* owner) {
+    const DetailOptions& detail = *static_cast<const DetailOptions*>(owner);
+    const auto check = [&](const char* name, double value, double least, const char* expected) {
+        if (value <= 0 || value >= least) return;
+        reader.report(name, reader.quoted(name) + " is " + number_text(value) + ", too small", expected);
+    };
+    check("size_m", detail.size_m, 20, "expected 0, or a number from 20 to 5000, in m");
+    check("mean_free_path_m", detail.mean_free_path_m, 1, "expected 0, or a number from 1 to 10000, in m");
+}
+
 const Section& detail_section() {
     static const Section section{
         "Detail",
@@ -433,7 +444,7 @@ const Section& detail_section() {
          key<&DetailOptions::apron_cells>(
              "apron_cells", "cells", between(0, 64),
              "How far from an open side cloud begins to thin out, so that no side cuts it straight.")},
-        nullptr};
+        &finish_detail};
     return section;
 }
 

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/paths.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "core/descriptor.h"
+#include "core/error.h"
+
+namespace nephos {
+namespace {
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what,
+                       const std::string& reason) {
+    throw Error(ErrorCode::io, path.string() + ": " + what + ": " + reason);
+}
+
+// Returns the folders that hold the missing ones of a path, innermost first.
+std::vector<std::filesystem::path> holders_of_missing(std::filesystem::path folder) {
+    std::vector<std::filesystem::path> holders;
+    std::error_code error;
+    while (!folder.empty() && !std::filesystem::exists(folder, error) && !error) {
+        std::filesystem::path holder = folder.parent_path();
+        if (holder == folder) break;
+        // The last part of "a/b/" is empty: "a/b" is no other folder.
+        if (folder.has_filename()) holders.push_back(holder.empty() ? std::filesystem::path(".") : holder);
+        folder = std::move(holder);
+    }
+    return holders;
+}
+
+}  // namespace
+
+void create_folders(const std::filesystem::path& folder) {
+    const std::vector<std::filesystem::path> holders = holders_of_missing(folder);
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) fail(folder, "cannot create the folder", error.message());
+    for (const std::filesystem::path& holder : holders) flush_folder(holder, folder);
+}
+
+void flush_folder(const std::filesystem::path& folder, const std::filesystem::path& reported) {
+    const Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (descriptor.get() < 0 && errno == EACCES) return;
+    if (descriptor.get() < 0) fail(reported, "cannot open its folder after writing", std::strerror(errno));
+    int failed;
+    do failed = ::fsync(descriptor.get());
+    while (failed != 0 && errno == EINTR);
+    if (failed != 0 && errno != EINVAL)
+        fail(reported, "cannot flush its folder to the device", std::strerror(errno));
+}
+
+std::filesystem::path normal_path(const std::filesystem::path& path) {
+    std::filesystem::path by_text = path.lexically_normal();
+    std::error_code error;
+    if (std::ranges::find(path, std::filesystem::path("..")) == path.end() ||
+        std::filesystem::equivalent(path, by_text, error))
+        return by_text;
+    // A file that is a link keeps its own name.
+    const std::filesystem::path name = path.filename();
+    const bool is_folder = name.empty() || name == "." || name == "..";
+    const std::filesystem::path folder = is_folder ? path : path.parent_path();
+    const std::filesystem::path whole = std::filesystem::canonical(folder.empty() ? "." : folder, error);
+    if (error) return by_text;
+    return is_folder ? whole : whole / name;
+}
+
+}  // namespace nephos
