@@ -78,10 +78,8 @@ void copy_statistics(const std::filesystem::path& from, const std::filesystem::p
                      std::string_view header) {
     std::string rows(header);
     read_statistics(
-        from, steps, [&](std::uint64_t, std::string_view row, const StateHash&) { (rows += row) += '\n'; }, header);
-    std::error_code error;
-    std::filesystem::create_directories(to.parent_path(), error);
-    if (error) throw Error(ErrorCode::io, to.parent_path().string() + ": cannot make the folder: " + error.message());
+        from, steps, [&](std::uint64_t, std::string_view row, const StateHash&) { (rows += row) += '\n'; },
+        header);
     write_atomically(to, rows);
 }
 
@@ -164,6 +162,9 @@ std::string scene_text_beside(const std::filesystem::path& from) {
 
 Simulation branched_simulation(const RunSettings& settings, const RunFolder& folder) {
     const Checkpoint checkpoint = read_checkpoint(settings.branch->checkpoint);
+    if (!is_same(point_of(checkpoint, settings.branch->checkpoint), *settings.branch))
+        throw Error(ErrorCode::io, settings.branch->checkpoint.string() +
+                                       ": was changed while the branch began: give the same command again");
     const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
     std::error_code failed;
     if (std::filesystem::equivalent(parent.folder.empty() ? "." : parent.folder, folder.folder, failed)) {

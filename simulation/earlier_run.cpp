@@ -91,6 +91,14 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
                             folder.folder.string(), reason));
 }
 
+// Returns whether a new run of the same scene makes all files of an earlier one again.
+bool makes_again(const EarlierRun& earlier, const RunSettings& settings) {
+    const SimulationRange &then = earlier.range, &now = settings.range;
+    const bool has_frames = then.last_frame >= then.first_frame;
+    return now.last_step >= then.last_step && (settings.render || !earlier.render) &&
+           (!has_frames || (now.first_frame <= then.first_frame && now.last_frame >= then.last_frame));
+}
+
 std::string range_text(const EarlierRun& run) {
     if (run.range.last_frame < run.range.first_frame) return "statistics alone";
     return fmt::format("frames {}..{}{}", run.range.first_frame, run.range.last_frame,
@@ -157,13 +165,15 @@ Scene scene_before(const EarlierRun& earlier, const RunSettings& settings, const
     before.steps = std::min(earlier.scene_steps, settings.scene.steps);
     if (earlier.simulation_hash == settings.simulation_hash && earlier.scene_hash == scene_hash(before))
         return before;
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("{}: was started with another scene (hash {}, now {}; {}). Resume with the scene, "
-                    "--seed, --set and --video of the first call (manifest.json has the scene under "
-                    "\"scene_text\"; only time.steps may be larger), or start anew with --overwrite",
-                    folder.folder.string(), earlier.scene_hash, settings.scene_hash,
-                    difference(earlier, settings, before)));
+    const std::string hashes =
+        earlier.scene_hash == settings.scene_hash
+            ? ""
+            : fmt::format("hash {}, now {}; ", earlier.scene_hash, settings.scene_hash);
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: was started with another scene ({}{}). Resume with the scene, "
+                            "--seed, --set and --video of the first call (manifest.json has the scene under "
+                            "\"scene_text\"; only time.steps may be larger), or start anew with --overwrite",
+                            folder.folder.string(), hashes, difference(earlier, settings, before)));
 }
 
 // Throws Error(usage) when frames that are to come would be drawn with other pictures than those that are there.
@@ -243,6 +253,18 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings) {
     if (earlier.scene_hash != settings.scene_hash) {
         refuse(folder, fmt::format("it holds a run of '{}' with another scene or seed ({})", earlier.name,
                                    changed_keys(earlier, settings)));
+    }
+    const std::string inputs =
+        changed_inputs(earlier.inputs, inputs_of(settings),
+                       {FileKind::first_state, FileKind::simulation, FileKind::picture});
+    if (earlier.simulation_hash != settings.simulation_hash || !inputs.empty()) {
+        refuse(folder, fmt::format("it holds a run of '{}' with another beginning ({})", earlier.name,
+                                   inputs.empty() ? other_content(earlier, settings)
+                                                  : "another content of " + inputs));
+    }
+    if (earlier.complete && !makes_again(earlier, settings)) {
+        refuse(folder, fmt::format("it holds a complete run for {}, not all of which would be made again",
+                                   range_text(earlier)));
     }
     if (!is_there(folder.checkpoint())) return;
     if (!is_checkpoint(folder.checkpoint())) {

@@ -17,6 +17,7 @@
 #include "density/combine.h"
 #include "scenes/format/errors.h"
 #include "scenes/format/given_keys.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
 #include "scenes/format/writer.h"
@@ -350,27 +351,32 @@ std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& pa
     });
 }
 
+Scene scene_of_texts(const std::string& canonical, const std::string& given,
+                     const std::filesystem::path& manifest) {
+    const auto read = [&](const std::string& text, const char* name) {
+        return read_scene_text(text, manifest.string() + name, {}, {}, SceneUse::without_frames);
+    };
+    // Earlier versions have no given keys, and a program may have changed more than they show.
+    try {
+        if (!given.empty())
+            if (Scene scene = read(given, ": scene_given"); to_toml(scene) == canonical) return scene;
+    } catch (const SceneErrors&) {
+    }
+    Scene scene = read(canonical, ": scene_text");
+    scene.given = {};
+    return scene;
+}
+
 std::string read_scene_text_of(const std::filesystem::path& path) {
     const auto [canonical, given] = with_manifest(path, [](const Json& json) {
         return std::pair(json.at("scene_text").get<std::string>(), json.value("scene_given", std::string()));
     });
-    const auto read = [&](const std::string& text, const char* name) {
-        return read_scene_text(text, path.string() + name, {}, {}, SceneUse::without_frames);
-    };
-    // Earlier versions have no given keys, and a program may have changed more than they show: then the canonical text.
-    std::optional<Scene> as_given;
-    try {
-        if (!given.empty()) as_given = read(given, ": scene_given");
-    } catch (const SceneErrors&) {
-    }
-    Scene scene;
-    if (as_given && to_toml(*as_given) == canonical) {
-        scene = std::move(*as_given);
-    } else {
-        scene = read(canonical, ": scene_text");
-        scene.given = {};
-    }
+    Scene scene = scene_of_texts(canonical, given, path);
     locate_inputs(scene, path.parent_path(), read_manifest(path).inputs);
+    for_each_file(scene, [](const std::string&, FileKind, const std::filesystem::path& file) {
+        require_scene_name(file);
+        return file;
+    });
     return given_toml(scene);
 }
 

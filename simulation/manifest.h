@@ -79,6 +79,11 @@ int frame_number(const nlohmann::ordered_json& json, const std::filesystem::path
 // Returns whether a path of a list leads to something below the list's folder, without detours.
 bool is_inside_folder(const std::filesystem::path& path);
 
+// Returns the scene of a manifest from its two texts: as it was given where that is the same scene, else from the canonical
+// one, which spells out every key. Throws SceneErrors.
+Scene scene_of_texts(const std::string& canonical, const std::string& given,
+                     const std::filesystem::path& manifest);
+
 // Returns the canonical text of the scene of an earlier run, with the files that it names where they are seen from here.
 // Throws Error(io) as read_manifest(), and when the scene cannot be read.
 std::string read_scene_text_of(const std::filesystem::path& path);

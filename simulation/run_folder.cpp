@@ -10,6 +10,7 @@
 
 #include "automaton/checkpoint.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "density/vdb/vdb_file.h"
 #include "density/voxel_digest.h"
 #include "render/image/video.h"
@@ -34,12 +35,6 @@ double seconds_between(Clock::time_point begin, Clock::time_point end) {
     return std::chrono::duration<double>(end - begin).count();
 }
 double seconds_since(Clock::time_point begin) { return seconds_between(begin, Clock::now()); }
-
-void make_folder(const std::filesystem::path& folder) {
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) throw Error(ErrorCode::io, folder.string() + ": cannot make the folder: " + error.message());
-}
 
 // Turns results into files: statistics and manifest here, those of frames beside the simulation.
 class Recorder : public SimulationSink {
@@ -76,7 +71,7 @@ class Recorder : public SimulationSink {
     void begin() {
         write_manifest(false, 0);
         statistics_ = StatisticsFile::create(folder_.statistics());
-        if (!settings_.scene.layers.empty()) make_folder(folder_.folder / "statistics");
+        if (!settings_.scene.layers.empty()) create_folders(folder_.folder / "statistics");
         for (const LayerOptions& layer : settings_.scene.layers) {
             layer_statistics_.push_back(
                 StatisticsFile::create(folder_.statistics(layer.name), kLayerStatisticsHeader));

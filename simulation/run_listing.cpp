@@ -48,11 +48,12 @@ RunListing read_run(const std::filesystem::path& folder) {
     run.scene_file = earlier.scene_file;
     run.inputs = earlier.inputs;
     run.branch = earlier.branch;
-    std::string text;
+    std::string text, given;
     const Json json = parsed_json(path);
     try {
         run.nephos_version = json.at("nephos_version").get<std::string>();
         text = json.at("scene_text").get<std::string>();
+        given = json.value("scene_given", std::string());
         for (const Json& frame : json.at("frames")) run.frames.push_back(frame_of(frame, path));
         if (json.contains("run_files"))
             for (const Json& file : json.at("run_files")) run.run_files.push_back(file_record(file, path));
@@ -66,7 +67,7 @@ RunListing read_run(const std::filesystem::path& folder) {
         frame.rain = std::move(rain[frame.number]);
     }
     try {
-        run.scene = read_scene_text(text, path.string() + ": scene_text", {}, {}, SceneUse::without_frames);
+        run.scene = scene_of_texts(text, given, path);
     } catch (const Error& error) {
         throw Error(ErrorCode::io, path.string() + ": its scene cannot be read: " + error.what());
     }

@@ -156,6 +156,17 @@ class Decoder {
     double largest_ = 0;
 };
 
+// Voxels that are compared one by one: as floats they take 1 GiB. Boxes between layers that lie far apart have many, and
+// hardly any with cloud.
+constexpr std::size_t kMostCompared = std::size_t(1) << 28;
+
+bool is_too_large(const DensityGrid& grid) { return grid.extent().cells() > kMostCompared; }
+
+std::string not_compared(const DensityGrid& grid) {
+    return fmt::format("not done: the box has {} voxels, of which at most {} are compared",
+                       grid.extent().cells(), kMostCompared);
+}
+
 // The density of layers must be that of the file of all together.
 void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
                     const std::vector<DensityGrid>& layers, const std::vector<Boundaries>& boundaries,
@@ -176,6 +187,7 @@ void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
 }
 
 Check check_seams(const RunListing& run, const DensityGrid& grid, bool all) {
+    if (is_too_large(grid)) return {"seam", true, not_compared(grid)};
     const Vec3 period = period_m(run.scene, std::nullopt);
     const std::vector<float> density = grid.to_dense();
     Check check{"seam", true, {}};
@@ -220,11 +232,15 @@ class Frames {
         const auto expected =
             std::ranges::count_if(run_.scene.layers, [](const auto& layer) { return has_density(layer); });
         if (whole != grids.end() && !layers.empty() && std::ssize(layers) == expected) {
-            compare_layers(frame, whole->second, layers, boundaries, largest_, sums_);
-            ++compared_;
+            if (is_too_large(whole->second)) {
+                too_large_ = not_compared(whole->second);
+            } else {
+                compare_layers(frame, whole->second, layers, boundaries, largest_, sums_);
+                ++compared_;
+            }
         }
         last_ = whole != grids.end() ? whole->second : grids.begin()->second;
-        motion_.add(*last_);
+        if (!is_too_large(*last_)) motion_.add(*last_);
     }
 
     void checks(const VerifyOptions& options, std::vector<Check>& checks) const {
@@ -232,10 +248,13 @@ class Frames {
             checks.push_back(sums_.check(
                 "layers",
                 fmt::format("add up to the common grid within {:.2g} in {} frames", largest_, compared_)));
+        } else if (!too_large_.empty()) {
+            checks.push_back({"layers", true, too_large_});
         }
         if (!last_) return;
         checks.push_back(check_seams(run_, *last_, options.seam));
-        checks.push_back(motion_.check(options.max_change));
+        checks.push_back(is_too_large(*last_) ? Check{"motion", true, not_compared(*last_)}
+                                              : motion_.check(options.max_change));
     }
 
   private:
@@ -244,6 +263,7 @@ class Frames {
     Problems sums_;
     double largest_ = 0;
     std::size_t compared_ = 0;
+    std::string too_large_;  // why frames were not compared
     std::optional<DensityGrid> last_;
 };
 

@@ -133,7 +133,11 @@ UntilReport run_until(RunSettings settings, const StopAt& stop, std::uint64_t ma
         if (!report.run.complete) return report;
         report.series = series_report(file, settings.scene, stop);
         if (report.series.reached || steps >= max_steps) break;
-        steps = std::min(max_steps, steps + steps / 2);
+        if (observer.stop && observer.stop()) {  // between two parts
+            report.run.complete = false;
+            return report;
+        }
+        steps = std::min(max_steps, steps + std::max<std::uint64_t>(steps / 2, 1));
         settings.stamps.clear();  // the next part has what was read of the files
         settings.resume = true;
         settings.overwrite = false;

@@ -86,9 +86,22 @@ int report(const Error& error) {
     return int(error.code());
 }
 
+// An option with a value that is empty, such as `--out=`: the parser would take the next argument for it.
+std::string_view option_without_value(int argc, const char* const* argv) {
+    for (int n = 1; n < argc; ++n) {
+        const std::string_view word = argv[n];
+        if (word == "--") break;
+        if (word.starts_with("--") && word.find('=') == word.size() - 1) return word;
+    }
+    return {};
+}
+
 int run_command(CLI::App& app, int argc, const char* const* argv, const EditFunction& edit) {
     Action action;
     add_commands(app, action, edit);
+    if (const std::string_view option = option_without_value(argc, argv); !option.empty())
+        return report_usage(
+            app, "`" + std::string(option) + "` has no value: expected " + std::string(option) + "VALUE");
     try {
         app.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {

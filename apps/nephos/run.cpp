@@ -343,15 +343,16 @@ void add_run_command(CLI::App& app, Action& action) {
     add_quiet(*command, a->work);
     command->footer(
         "Writes DIR/density/NAME_0001.vdb ..., DIR/frames/NAME_0001.png ..., DIR/statistics.csv,\n"
-        "DIR/manifest.json and DIR/checkpoint.nephos; files of an earlier run of the same "
-        "scene are replaced.\n"
+        "DIR/manifest.json and DIR/checkpoint.nephos. A complete run of the same scene is replaced by one\n"
+        "that makes all of its files again.\n"
         "The first Ctrl-C finishes the step and leaves a checkpoint, the second stops at once.\n"
         "\n"
         "Examples:\n"
         "  nephos run scenes/cumulus.toml\n"
         "  nephos run scenes/stratus.toml --out /tmp/st --no-render --set time.steps=500\n"
         "  nephos run scenes/cumulus.toml --resume\n"
-        "  nephos run --from out/cumulus --set field.background.ext=0.4 --set time.steps=600 --out out/drier");
+        "  nephos run --from out/cumulus --set field.background.ext=0.4 --set time.steps=600 --out "
+        "out/drier");
     command->callback([a, &action] { action = [a] { return run(*a); }; });
 }
 

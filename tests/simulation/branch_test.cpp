@@ -63,6 +63,24 @@ TEST_F(BranchTest, WithoutChangesIsTheLongRun) {
     }
 }
 
+TEST_F(BranchTest, RefusesACheckpointThatWasWrittenMeanwhile) {
+    RunSettings first = settings(6, "first"), later = settings(7, "later"), branch = settings(14, "branch");
+    ASSERT_TRUE(run_scene(first, {}).complete);
+    ASSERT_TRUE(run_scene(later, {}).complete);
+    branch_off(branch, first.folder);
+    fs::copy_file(later.folder / "checkpoint.nephos", first.folder / "checkpoint.nephos",
+                  fs::copy_options::overwrite_existing);
+    try {
+        run_scene(branch, {});
+        FAIL() << "the manifest would name another checkpoint than the one that the run began with";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::io);
+        EXPECT_NE(std::string(error.what()).find("was changed while the branch began"), std::string::npos)
+            << error.what();
+    }
+    EXPECT_FALSE(fs::exists(branch.folder / "manifest.json"));
+}
+
 TEST_F(BranchTest, GoesAnotherWayUnderAnotherScene) {
     RunSettings first = settings(6, "first"), drier = settings(12, "drier", 0.9);
     ASSERT_TRUE(run_scene(first, {}).complete);

@@ -62,6 +62,16 @@ class Faults(Case):
                 self.same_runs("undisturbed", "out")
                 shutil.rmtree(self.folder / "out")
 
+    def test_a_new_folder_is_flushed_into_the_one_that_holds_it(self):
+        """A power cut takes no folder away from under its files: the first flush of a run is that of the new folder's place."""
+        (self.folder / "there").mkdir()
+        for out in ("new", "there/new", "there/a/b/new/"):
+            with self.subTest(out):
+                failed = self.run_into(out, env=self.failing("fsync EIO 1 1"))
+                self.assertEqual(failed.returncode, 3, failed.stderr)
+                self.assertIn("cannot flush its folder to the device: Input/output error", failed.stderr)
+                self.assertEqual(self.run_into(out).returncode, 0)
+
     def test_whatever_call_fails_the_files_are_whole_and_there_is_a_way_forward(self):
         """The same bytes as of an undisturbed run, after at most one more call without --overwrite."""
         self.assertEqual(self.run_into("undisturbed").returncode, 0)

@@ -53,6 +53,90 @@ class Run(Case):
         both = json.loads(self.call("info", "--json", run["files"]["density"][0], run["files"]["checkpoint"][0]).stdout)
         self.assertEqual([entry["kind"] for entry in both], ["vdb", "checkpoint"])
 
+    def test_a_complete_run_is_replaced_only_by_all_of_it(self):
+        """What a call does not make again stays, unless --overwrite says so: frames, pictures, steps, a branch, another content."""
+        def kept(folder, *arguments, says):
+            before = {path: path.read_bytes() for path in sorted((self.folder / folder).rglob("*")) if path.is_file()}
+            said = self.refused(2, "run", *arguments, "--out", folder, says=says).stderr
+            self.assertIn("choose another --out, or give --overwrite", said)
+            self.assertEqual(before, {path: path.read_bytes() for path in sorted((self.folder / folder).rglob("*")) if path.is_file()})
+        self.call("run", self.scene, "--no-render", "--out", "frames")
+        for more in (("--statistics-only",), ("--no-render", "--frames", "1..2"), ("--no-render", "--frames", "2..")):
+            kept("frames", self.scene, *more, says="it holds a complete run for frames 1..5, without pictures")
+        self.call("run", self.scene, "--no-render", "--out", "frames")
+        self.call("run", self.scene, "--splatting", "cpu", "--out", "frames")
+        kept("frames", self.scene, "--no-render", says="it holds a complete run for frames 1..5,")
+        self.call("run", self.scene, "--no-render", "--out", "frames", "--overwrite")
+        self.call("run", self.scene, "--statistics-only", "--out", "rows")
+        kept("rows", self.scene, "--no-render", "--frames", "1..2", says="it holds a complete run for statistics alone")
+        self.call("run", self.scene, "--no-render", "--out", "rows")
+        # Branches of one scene, and the run without them.
+        drier = (self.scene, "--statistics-only", "--checkpoint", "--set", "field.background.ext=0.4")
+        for steps in (2, 3):
+            self.call("run", self.scene, "--statistics-only", "--checkpoint", "--set", f"time.steps={steps}", "--out", f"par{steps}")
+        self.call("run", "--from", "par2", *drier, "--out", "branch")
+        kept("branch", *drier, says="it branched off another run")
+        kept("branch", "--from", "par3", *drier, says="another beginning")
+        self.call("run", "--from", "par2", *drier, "--out", "branch")
+        # One name, another content.
+        started = [self.scene, "--statistics-only", "--set"]
+        for folder, steps in (("d1", 1), ("d2", 2)):
+            (self.folder / folder).mkdir()
+            self.call("state", self.scene, "--steps", steps, "--out", f"{folder}/s.vdb")
+        self.call("run", *started, "lattice.initial_state=d1/s.vdb", "--out", "started")
+        kept("started", *started, "lattice.initial_state=d2/s.vdb", says="another content of s.vdb of `lattice.initial_state`")
+        self.call("run", *started, "lattice.initial_state=d1/s.vdb", "--out", "started")
+
+    def test_until_goes_on_from_few_steps_and_stops(self):
+        until = ("run", self.scene, "--statistics-only", "--until", "cover.se=1e-9", "--set", "field.background.ext=0.4")
+        for steps in (0, 1):
+            self.call(*until, "--max-steps", "40", "--set", f"time.steps={steps}", "--out", f"u{steps}", status=1)
+            self.assertEqual(len(rows_of(self.folder / f"u{steps}/statistics.csv")), 41)
+        process = subprocess.Popen([NEPHOS, *until, "--max-steps", "1000000000", "--set", "time.steps=1", "--out", "stopped"],
+                                   cwd=self.folder, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while not (self.folder / "stopped/checkpoint.nephos").exists():
+            self.assertIsNone(process.poll())
+            time.sleep(0.01)
+        process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 128 + signal.SIGTERM, said)
+        self.assertIn("with --resume goes on", said)
+
+    def test_a_scene_whose_canonical_text_is_long(self):
+        """Every key spelled out, the scene of this run has more bytes than a scene may have."""
+        small = "{centre_m=[%d,300,300],semi_axes_m=[60,60,60]}"
+        entries = ",\n".join(small % (100 + n % 1000) for n in range(40_000))
+        long = self.write("long.toml", SCENE.replace("[field.background]", f"[field]\nellipsoids = [{entries}]\n[field.background]"))
+        run = ("--no-render", "--set", "time.steps=2", "--set", "frames.count=1")
+        self.call("run", long, *run, "--out", "a")
+        self.assertGreater(len(json.loads((self.folder / "a/manifest.json").read_text())["scene_text"]), 8 << 20)
+        self.call("verify", "a")
+        self.call("export", "a", "--for", "blender", "--out", "b")
+        self.call("run", "--resume", "--out", "a", "--no-render")
+
+    def test_an_option_whose_value_is_empty(self):
+        for command in (["run", self.scene, "--out=", "--statistics-only"], ["sweep", self.scene, "--axis="], ["state", self.scene, "--out=", "--steps"]):
+            self.assertIn("= has no value: expected ", self.call(*command, status=2).stderr.replace("`", ""))
+        self.assertEqual([path.name for path in self.folder.iterdir()], ["tiny.toml"])
+
+    def test_a_folder_whose_name_no_scene_can_hold(self):
+        folder = os.fsencode(self.folder) + b"/f\xffx"
+        os.mkdir(folder)
+        self.call("state", self.scene, "--steps", "1", "--out", "s.vdb")
+        os.rename(self.folder / "s.vdb", folder + b"/s.vdb")
+        with open(folder + b"/a.toml", "w") as file:
+            file.write(SCENE.replace("cells = [32, 24, 12]", 'cells = [32, 24, 12]\ninitial_state = "s.vdb"'))
+
+        def run(*arguments):
+            done = subprocess.run([os.fsencode(NEPHOS), b"run", *arguments, b"--statistics-only", b"--checkpoint"], cwd=self.folder,
+                                  env=self.environment, capture_output=True, timeout=60)
+            return done.returncode, done.stderr
+        self.assertEqual(run(b"f\xffx/a.toml", b"--out", b"f\xffx/out"), (0, b""))
+        for arguments in ((b"--resume", b"--out", b"f\xffx/out"), (b"--from", b"f\xffx/out", b"--out", b"branch")):
+            status, said = run(*arguments)
+            self.assertEqual(status, 2, said)
+            self.assertIn(b"f\\xffx/s.vdb: its name is no UTF-8", said)
+
     def test_frames_writes_only_these(self):
         self.call("run", self.scene, "--no-render", "--out", "all")
         self.call("run", self.scene, "--no-render", "--out", "some", "--frames", "2..3")
