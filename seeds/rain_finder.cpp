@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "core/bytes.h"
 #include "seeds/checks.h"
@@ -190,11 +191,16 @@ std::vector<RainPatch> find_patches(const BitPlaneView& cld, const Placement& pl
                                     const Boundaries& boundaries, const RainFinderOptions& options) {
     std::vector<std::uint32_t> water = column_counts(cld);
     smooth(water, cld.extent, boundaries, options.smooth_columns);
+    constexpr double kLeast = std::numeric_limits<double>::denorm_min();
     const double edge = 2.0 * options.smooth_columns + 1;
     const double scale = placement.cell_size_m / (edge * edge);
-    WaterMap map{
-        cld.extent, boundaries, std::move(water), options.keep_water_m / scale, options.start_water_m / scale,
-        {}};
+    WaterMap map{// Above 0 whatever the unit: a column without water is in no patch.
+                 cld.extent,
+                 boundaries,
+                 std::move(water),
+                 std::max(options.keep_water_m / scale, kLeast),
+                 std::max(options.start_water_m / scale, kLeast),
+                 {}};
     std::vector<RainPatch> patches;
     for (int j = 0; j < cld.extent.y; ++j) {
         for (int i = 0; i < cld.extent.x; ++i) {

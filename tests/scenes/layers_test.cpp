@@ -206,6 +206,16 @@ climate = { initial_state = 0.5 }
 coupling = { min_semi_axis_m = 3 }
 )";
 
+// Two zeros that are equal would be two texts and two hashes.
+TEST(Layers, HaveOneZero) {
+    std::string text = kTwoLayers;
+    const std::string state = "initial_state = 0.5";
+    text.replace(text.find(state), state.size(), "initial_state = -0.0, final_state = -0.0, duration_s = 60");
+    const Scene scene = read_scene_text(text, "zero.toml");
+    EXPECT_EQ(to_toml(scene).find("-0.0"), std::string::npos);
+    EXPECT_EQ(scene_hash(scene), scene_hash(read_scene_text(to_toml(scene), "zero.toml")));
+}
+
 TEST(Layers, TakeWhatTheySayNotFromTheScene) {
     const Scene scene = read_scene_text(kTwoLayers, "two.toml");
     const AutomatonOptions low = automaton_options(scene, 0), middle = automaton_options(scene, 1);

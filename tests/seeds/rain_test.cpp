@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <limits>
 #include <map>
 #include <random>
 
@@ -391,6 +392,18 @@ TEST(RainFinder, LimitsAndSavedState) {
 }
 
 // A square of n x n columns has the variance of the full square, n^2 / 12, not that of the columns' centres.
+// A threshold that is 0 in units of cells would let patches grow over dry columns for ever.
+TEST(RainFinder, DryColumnsAreInNoPatch) {
+    RainFinderOptions options = quick();
+    options.keep_water_m = options.start_water_m = std::numeric_limits<double>::denorm_min();
+    options.min_area_m2 = 0;
+    BitPlane plane(kExtent);
+    plane.set(10, 12, 3, true);
+    const auto patches = find_patches(plane.view(), kPlacement, kPeriodic, options);
+    ASSERT_EQ(patches.size(), 1u);
+    EXPECT_DOUBLE_EQ(patches[0].area_m2, 50 * 50);
+}
+
 TEST(RainFinder, ColumnsAreSquares) {
     BitPlane plane(kExtent);
     for (int j = 20; j < 24; ++j) {
