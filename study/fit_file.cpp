@@ -38,7 +38,7 @@ struct Measured {
 // Reads the keys that say what is run. Returns nothing where that does not do, and has said so: the scene's own problems in
 // its file, those of `set` and `layer` where they stand.
 std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem::path& folder,
-                                        SweepOptions& base) {
+                                        SweepOptions& base, int& unread) {
     const std::optional<std::string> scene = table.text("scene");
     base.overrides = table.texts("set");
     base.layer = table.text("layer").value_or("");
@@ -59,6 +59,7 @@ std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem:
         }
     } catch (const Error& error) {
         const bool is_unread = error.code() == ErrorCode::io;
+        unread += is_unread;
         table.report(is_unread ? "scene" : "layer", error.what(),
                      is_unread ? "expected the file of a scene, its path relative to the folder of this file"
                                : "expected layer = \"NAME\" of a scene with layers alone");
@@ -232,8 +233,8 @@ MaskOptions read_mask_options(TomlTable& target) {
 
 // A target that a cloud mask gives: its value, and the standard error of it where the file does not say another sd.
 void read_target_mask(TomlTable& target, const std::filesystem::path& folder,
-                      const std::optional<Measured>& measured, FitTarget& to,
-                      std::vector<std::string>& notes) {
+                      const std::optional<Measured>& measured, FitTarget& to, std::vector<std::string>& notes,
+                      int& unread) {
     const std::vector<std::string> files = target.texts("from");
     std::vector<std::filesystem::path> paths;
     for (const std::string& file : files) paths.push_back(folder / file);
@@ -264,6 +265,7 @@ void read_target_mask(TomlTable& target, const std::filesystem::path& folder,
             if (std::ranges::count(notes, note) == 0) notes.push_back(note);
         mean = mask_statistics(masks).statistics[statistic_index(to.statistic)];
     } catch (const Error& error) {
+        unread += error.code() == ErrorCode::io;
         return target.report("from", error.what(), "expected a cloud mask: .vdb, .nc or .png");
     }
     to.value = mean.mean;
@@ -277,7 +279,8 @@ void read_target_mask(TomlTable& target, const std::filesystem::path& folder,
 }
 
 void read_target(TomlTable& target, const std::filesystem::path& folder, int clouds_every,
-                 const std::optional<Measured>& measured, FitTarget& to, std::vector<std::string>& notes) {
+                 const std::optional<Measured>& measured, FitTarget& to, std::vector<std::string>& notes,
+                 int& unread) {
     std::vector<std::string_view> names;
     for (const StatisticInfo& info : kStatistics) names.push_back(info.name);
     const std::optional<std::size_t> statistic = target.word("statistic", names);
@@ -287,7 +290,7 @@ void read_target(TomlTable& target, const std::filesystem::path& folder, int clo
                       fmt::format("`{}` is of snapshots, and clouds_every = 0 takes none", to.statistic),
                       "expected clouds_every = 10, or another statistic");
     if (target.has("from")) {
-        read_target_mask(target, folder, measured, to, notes);
+        read_target_mask(target, folder, measured, to, notes, unread);
         return;
     }
     if (!target.has("statistic") || !target.has("value") || !target.has("sd"))
@@ -304,8 +307,9 @@ void read_target(TomlTable& target, const std::filesystem::path& folder, int clo
 FitOptions read_fit_file(const std::filesystem::path& path, std::optional<std::uint64_t> runs) {
     FitOptions options;
     options.base.replicates = 1;
+    int unread = 0;  // problems that are files which cannot be read
     const auto read = [&](TomlTable& table) {
-        std::optional<Measured> measured = read_scene_keys(table, path.parent_path(), options.base);
+        std::optional<Measured> measured = read_scene_keys(table, path.parent_path(), options.base, unread);
         options.base.clouds_every = int(
             table.integer("clouds_every", 0, 1'000'000).value_or(std::uint64_t(options.base.clouds_every)));
         options.problem.runs = table.integer("runs", 8, 1'000'000).value_or(options.problem.runs);
@@ -333,12 +337,17 @@ FitOptions read_fit_file(const std::filesystem::path& path, std::optional<std::u
                          fmt::format("expected {} or more", fewest));
         table.tables("target", [&](TomlTable& target) {
             read_target(target, path.parent_path(), options.base.clouds_every, measured,
-                        options.problem.targets.emplace_back(), options.notes);
+                        options.problem.targets.emplace_back(), options.notes, unread);
         });
         if (options.problem.targets.empty())
             table.report("target", "the fit has no target", "expected a table [[target]]");
     };
-    read_toml_file(path, read, "fit file");
+    try {
+        read_toml_file(path, read, "fit file");
+    } catch (const SceneErrors& errors) {
+        if (unread == 0 || errors.problems().size() != std::size_t(unread)) throw;
+        throw SceneErrors(errors.problems(), ErrorCode::io);
+    }
     return options;
 }
 

@@ -91,15 +91,16 @@ void write_results(const FitOptions& options, const FitResult& result, const std
                 line += (line.empty() ? "" : ",") + number_text(sample[d]);
         csv += line + '\n';
     }
-    write_atomically(folder / "posterior.csv", csv);
-
     std::vector<std::string> overrides = options.base.overrides;
     for (std::size_t d = 0; d < result.best.size(); ++d)
         for (const std::string& key : options.problem.parameters[d].keys)
             overrides.push_back(key + "=" + number_text(result.best[d]));
     write_atomically(
         folder / "fitted.toml",
-        given_toml(placed_scene(options.base.source->read(overrides, SceneUse::without_frames), folder)));
+        std::string(kWrittenByFit) +
+            given_toml(placed_scene(options.base.source->read(overrides, SceneUse::without_frames), folder)));
+    // After the scene, by whose first line it is known for a fit's.
+    write_atomically(folder / "posterior.csv", csv);
 
     using Json = nlohmann::ordered_json;
     const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(); };

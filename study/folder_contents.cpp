@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/folder_contents.h"
 
-#include <initializer_list>
+#include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
-#include "study/records.h"
 #include "study/sweep_plan.h"
 #include <fmt/format.h>
 
@@ -31,7 +31,31 @@ bool begins_with(const fs::path& file, std::string_view text) {
 }
 
 constexpr std::string_view kSweepManifest = "{\n  \"format\": \"nephos sweep\"",
-                           kFit = "{\n  \"format\": \"nephos fit\"";
+                           kFit = "{\n  \"format\": \"nephos fit\"", kSweep = "a sweep";
+
+// The tables of a sweep that are text, and how their first lines begin.
+constexpr std::pair<std::string_view, std::string_view> kTables[] = {
+    {"manifest.json", kSweepManifest},
+    {"scene.toml", kWrittenBySweep},
+    {"sweep.toml", kWrittenBySweep},
+    {"runs.csv", "run,point,replicate,"},
+    {"points.csv", "point,"},
+    {"failures.csv", "run,point,replicate,"},
+    {"tracks.csv", "run,point,replicate,"},
+};
+
+// NetCDF of a sweep: its title stands behind its few dimensions.
+bool is_series_of_sweep(const fs::path& file) {
+    constexpr std::size_t kHead = 4096;
+    try {
+        const std::string head = read_beginning(file, kHead);
+        return head.starts_with("CDF") && head.find(kSweepTitle) != head.npos;
+    } catch (const Error&) {
+        return false;
+    }
+}
+
+}  // namespace
 
 void require_absent(const fs::path& file, std::string_view by) {
     if (!is_there(file)) return;
@@ -41,34 +65,28 @@ void require_absent(const fs::path& file, std::string_view by) {
                     file.string(), by));
 }
 
-}  // namespace
-
 void require_own(const fs::path& file, std::string_view beginning, std::string_view by) {
     if (!begins_with(file, beginning)) require_absent(file, by);
 }
 
 void require_sweep_folder(const fs::path& folder) {
-    constexpr std::string_view kSweep = "a sweep";
-    require_own(folder / "manifest.json", kSweepManifest, kSweep);
-    if (has_shards(folder)) return;  // also of a version that marked nothing
-    require_own(folder / "scene.toml", kWrittenBySweep, kSweep);
-    require_own(folder / "sweep.toml", kWrittenBySweep, kSweep);
-    // Leaves links and pipes to open_regular_file(), which refuses them with the reason.
+    for (const auto& [name, beginning] : kTables) require_own(folder / name, beginning, kSweep);
+    if (!is_series_of_sweep(folder / "series.nc")) require_absent(folder / "series.nc", kSweep);
+    // Leaves links and pipes to open_regular_file(), which refuses them with the reason; a killed sweep leaves it empty.
+    const fs::path timing = folder / "timing.csv";
     std::error_code error;
-    if (fs::is_regular_file(fs::symlink_status(folder / "timing.csv", error)))
-        require_own(folder / "timing.csv", "shard,shards,", kSweep);
-    if (is_there(folder / "manifest.json")) return;  // the last of the tables
-    require_own(folder / "runs.csv", "run,point,replicate,", kSweep);
-    if (is_there(folder / "runs.csv")) return;  // the first of them
-    for (const char* name : {"points.csv", "failures.csv", "tracks.csv", "series.nc"})
-        require_absent(folder / name, kSweep);
+    if (fs::is_regular_file(fs::symlink_status(timing, error)) && fs::file_size(timing, error) > 0)
+        require_own(timing, "shard,shards,", kSweep);
 }
 
 void require_fit_folder(const fs::path& folder) {
     for (const char* part : {"wave-1", "wave-2", "wave-3", "proof"}) require_sweep_folder(folder / part);
-    if (has_shards(folder / "wave-1") || begins_with(folder / "fit.json", kFit)) return;
-    for (const char* name : {"fit.json", "fitted.toml", "posterior.csv"})
-        require_absent(folder / name, "a fit");
+    require_own(folder / "fit.json", kFit, "a fit");
+    if (begins_with(folder / "fit.json", kFit)) return;
+    require_own(folder / "fitted.toml", kWrittenByFit, "a fit");
+    // Its columns are keys of a scene; it is written after fitted.toml.
+    if (!begins_with(folder / "fitted.toml", kWrittenByFit))
+        require_absent(folder / "posterior.csv", "a fit");
 }
 
 }  // namespace nephos

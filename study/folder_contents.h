@@ -8,13 +8,18 @@
 
 namespace nephos {
 
-// Throws Error(usage) that names a file in the folder which a sweep would replace and no sweep wrote, as a scene or a plan of
-// the user's own, or what a run left. A folder with records is one of a sweep; elsewhere each file tells by its beginning.
-// Thread-safe.
+// The title of a sweep's series.nc, and the first line of a fit's fitted.toml; kWrittenBySweep is that of a sweep's TOML.
+inline constexpr std::string_view kSweepTitle = "nephos sweep", kWrittenByFit = "# Written by nephos fit.\n";
+
+// Throws Error(usage) that names a file in the folder which a sweep would replace and no sweep wrote, as a scene or a plan
+// of the user's own, or what a run left. Each file tells by its beginning, beside records, too. Thread-safe.
 void require_sweep_folder(const std::filesystem::path& folder);
 
 // The same for a fit, and the files of its result.
 void require_fit_folder(const std::filesystem::path& folder);
+
+// Throws Error(usage) when something is there, which `by` would replace: "a sweep". Thread-safe.
+void require_absent(const std::filesystem::path& file, std::string_view by);
 
 // Throws Error(usage) when the file is there and does not begin as those that `by` writes: "a sweep". Thread-safe.
 void require_own(const std::filesystem::path& file, std::string_view beginning, std::string_view by);

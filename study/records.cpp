@@ -8,6 +8,7 @@
 #include <fstream>
 #include <span>
 
+#include "study/folder_contents.h"
 #include "study/packed_series.h"
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include "automaton/checkpoint.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "core/random.h"
 #include "core/text.h"
 #include "simulation/checked_json.h"
@@ -145,13 +147,32 @@ void append(const std::filesystem::path& path, const Descriptor& file, std::span
     size += content.size();
 }
 
+// Returns true for "0003-of-0012.jsonl".
+bool is_name_of_shard(const std::filesystem::path& path) {
+    const std::string name = path.stem().string();
+    const std::size_t middle = name.find("-of-");
+    const auto is_number = [](std::string_view text) {
+        return text.size() >= 4 && text.find_first_not_of("0123456789") == text.npos;
+    };
+    return path.extension() == ".jsonl" && middle != name.npos &&
+           is_number(std::string_view(name).substr(0, middle)) &&
+           is_number(std::string_view(name).substr(middle + 4));
+}
+
+// Throws Error(usage) where the file is there and begins as no shard does, nor as the first part of one.
+void require_own_records(const std::filesystem::path& path) {
+    constexpr std::string_view kRecord = "{\"run\":\"";
+    const std::string beginning = read_beginning(path, kRecord.size());
+    if (!kRecord.starts_with(beginning)) require_own(path, kRecord, "a sweep");
+}
+
 std::vector<std::filesystem::path> files_of_shards(const std::filesystem::path& folder) {
     std::vector<std::filesystem::path> files;
     std::error_code error;
     std::filesystem::directory_iterator at(folder / "shards", error), end;
     if (error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory) return files;
     for (; !error && at != end; at.increment(error))
-        if (at->path().extension() == ".jsonl") files.push_back(at->path());
+        if (is_name_of_shard(at->path())) files.push_back(at->path());
     if (error) throw Error(ErrorCode::io, (folder / "shards").string() + ": cannot read: " + error.message());
     std::ranges::sort(files);
     return files;
@@ -328,6 +349,7 @@ void remove_shards(const std::filesystem::path& folder, std::uint32_t number, st
     for (const std::filesystem::path& path : files) {
         locks.push_back(open_regular_file(path, O_RDWR | O_NOFOLLOW));
         lock(path, locks.back());
+        require_own_records(path);
     }
     for (const std::filesystem::path& path : files) {
         for (const std::filesystem::path& file :
@@ -339,23 +361,11 @@ void remove_shards(const std::filesystem::path& folder, std::uint32_t number, st
     }
 }
 
-bool has_shards(const std::filesystem::path& folder) {
-    return std::ranges::any_of(files_of_shards(folder), [](const std::filesystem::path& path) {
-        const std::string name = path.stem().string();
-        const std::size_t middle = name.find("-of-");
-        const auto is_number = [](std::string_view text) {
-            return !text.empty() && text.find_first_not_of("0123456789") == text.npos;
-        };
-        return middle != name.npos && is_number(std::string_view(name).substr(0, middle)) &&
-               is_number(std::string_view(name).substr(middle + 4));
-    });
-}
+bool has_shards(const std::filesystem::path& folder) { return !files_of_shards(folder).empty(); }
 
 FolderGuard::FolderGuard(const std::filesystem::path& folder) : folder_(folder) {
     const std::filesystem::path shards = folder / "shards";
-    std::error_code error;
-    std::filesystem::create_directories(shards, error);
-    if (error) throw Error(ErrorCode::io, shards.string() + ": cannot make the folder: " + error.message());
+    create_folders(shards);
     // A file that is open for writing: NFS locks no folders, and no others exclusively.
     file_ = open_regular_file(shards / "lock", O_RDWR | O_CREAT | O_NOFOLLOW).release();
     // Where a file system has no locks, nothing is kept apart, as with those of shards.
@@ -385,16 +395,18 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
       series_path_(std::filesystem::path(path_).replace_extension(".series")),
       files_(std::make_unique<Files>()),
       flushed_(std::chrono::steady_clock::now()) {
+    create_folders(path_.parent_path());
+    // Records come with their series, and never after them.
     std::error_code error;
-    std::filesystem::create_directories(path_.parent_path(), error);
-    if (error)
-        throw Error(ErrorCode::io,
-                    path_.parent_path().string() + ": cannot make the folder: " + error.message());
+    const bool is_file =
+        std::filesystem::is_regular_file(std::filesystem::symlink_status(series_path_, error));
+    if (is_file && !std::filesystem::exists(path_, error)) require_absent(series_path_, "a sweep");
     // What they are cut to is no file that somebody else has put a link to here.
     constexpr int kOwn = O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW;
     files_->records = open_regular_file(path_, kOwn);
     files_->series = open_regular_file(series_path_, kOwn);
     lock(path_, files_->records);
+    require_own_records(path_);
     Records records;
     records.folders_ = 1;
     const auto [bytes, series] = records.read_shard(path_, RecordsFor::running);

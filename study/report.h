@@ -8,11 +8,19 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "study/records.h"
 #include "study/sweep_plan.h"
 
 namespace nephos {
+
+// How every page begins: what begins otherwise is no report.
+inline constexpr std::string_view kReportBeginning =
+    "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
+    "style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n"
+    "<meta name=\"viewport\" content=\"width=device-width\">\n";
 
 // Returns the page: a function of its arguments and of the version of nephos, so equal sweeps have equal bytes, whoever ran
 // them, where and in which order. Large sweeps are drawn in part, and say so. Throws Error(io) when series cannot be read.

@@ -126,9 +126,15 @@ void place_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
     write_atomically(folder / "sweep.toml", plan.to_toml_in(folder));
 }
 
-// Counts what is there. Goes over all runs, but keeps none.
+// Counts what is there. Goes over all runs, but keeps none; over none where nothing is there.
 SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records& records) {
     SweepReport report;
+    if (records.size() == 0 && job.shards == 1) {
+        report.progress.in_all = plan.runs();
+        report.complete = plan.runs() == 0;
+        report.problems = records.problems();
+        return report;
+    }
     std::uint64_t known = 0;
     for (std::uint64_t n = 0; n < plan.runs(); ++n) {
         const PlannedRun run = plan.run(n);
@@ -291,8 +297,14 @@ std::uint64_t unused_records(const SweepPlan& plan, const Records& records) {
 }
 
 void write_plan_of_tables(const SweepPlan& plan, const std::filesystem::path& folder) {
-    std::error_code error;
-    if (!std::filesystem::exists(folder / "shards", error)) place_plan(plan, folder);
+    if (!has_shards(folder)) {
+        place_plan(plan, folder);
+    } else if (!is_plan_of(plan, folder)) {
+        throw Error(ErrorCode::usage,
+                    folder.string() +
+                        ": holds the records of a sweep of another plan: expected another --out "
+                        "for these tables");
+    }
 }
 
 }  // namespace nephos

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/math.h"
 #include "core/text.h"
+#include "scenes/format/text.h"
 #include "simulation/layer_simulation.h"
 
 namespace nephos {
@@ -41,8 +42,15 @@ void read_axis(TomlTable& table, const std::filesystem::path& folder, SweepOptio
             range.report("to", "the range of an axis is empty", "expected `to` above `from`");
         if (axis.scale == Scale::log && !(axis.from > 0))
             range.report("from", "a range on a log scale starts at or below 0", "expected `from` above 0");
-        if (const auto count = range.integer("count", 2, kMostValues); count && axis.to > axis.from)
-            axis.values = spread_values(axis.from, axis.to, *count, axis.scale);
+        else if (axis.scale == Scale::log && !std::isfinite(axis.to / axis.from))
+            range.report("from", "a range on a log scale spans more than numbers do",
+                         "expected `from` and `to` with a ratio below 1.7e308");
+        const auto count = range.integer("count", 2, kMostValues);
+        if (count && axis.to > axis.from) axis.values = spread_values(axis.from, axis.to, *count, axis.scale);
+        if (!axis.values.empty() && axis.values.size() < *count && axis.scale != Scale::integer)
+            range.report("count",
+                         fmt::format("the range has {} different values of 12 digits", axis.values.size()),
+                         "expected a wider range, or fewer values");
     });
     if (axis.values.empty() && !has_range)
         table.report("values", "an axis has no values",
@@ -112,6 +120,43 @@ std::string_view trimmed(std::string_view text) {
     return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
+SweepOptions read_sweep_text(std::string text, const std::filesystem::path& path) {
+    SweepOptions options;
+    read_toml_text(std::move(text), path.string(), [&](TomlTable& table) {
+        const std::optional<std::string> scene = table.text("scene");
+        if (!scene && !table.has("scene"))
+            table.report("scene", "the sweep has no scene", "expected scene = \"FILE.toml\"");
+        options.scene_file = path.parent_path() / scene.value_or("");
+        options.overrides = table.texts("set");
+        options.design = Design(table.word("design", {"grid", "list", "random", "latin_hypercube", "sobol"})
+                                    .value_or(std::size_t(Design::grid)));
+        options.points = table.integer("points", 1, 10'000'000).value_or(0);
+        options.replicates =
+            std::uint32_t(table.integer("replicates", 1, 100'000).value_or(options.replicates));
+        options.seed =
+            table.integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(options.seed);
+        options.common_seeds = table.word("seeds", {"per_point", "common"}).value_or(0) == 1;
+        options.clouds_every =
+            int(table.integer("clouds_every", 0, 1'000'000).value_or(std::uint64_t(options.clouds_every)));
+        options.tracks = table.flag("tracks").value_or(false);
+        options.layer = table.text("layer").value_or("");
+        table.table("steps", [&](TomlTable& steps) { read_steps(steps, options.steps); });
+        const std::filesystem::path folder = path.parent_path() / table.text("folder").value_or("");
+        table.tables("axis", [&](TomlTable& axis) { read_axis(axis, folder, options); });
+    });
+    return options;
+}
+
+bool is_sweep_text(const std::string& text, const std::filesystem::path& path) {
+    bool has_scene = false;
+    try {
+        // What else is in the file is unknown here, and reported by whoever reads it for good.
+        read_toml_text(text, path.string(), [&](TomlTable& table) { has_scene = table.has("scene"); });
+    } catch (const SceneErrors&) {
+    }
+    return has_scene;
+}
+
 }  // namespace
 
 std::vector<std::string> spread_values(double from, double to, std::uint64_t count, Scale scale) {
@@ -165,11 +210,16 @@ Axis parse_axis(const std::string& text) {
                          number_text(axis.to)));
     if (axis.scale == Scale::log && !(axis.from > 0))
         fail("has a range on a log scale that does not start above 0");
+    if (axis.scale == Scale::log && !std::isfinite(axis.to / axis.from))
+        fail("has a range on a log scale that spans more than numbers do");
     if (colon != rest.npos) {
         const double count = parse_number(rest.substr(colon + 1), text);
         if (!(count >= 2 && count <= double(kMostValues) && count == std::floor(count)))
             fail("has a count that is not a whole number from 2 to 100,000");
         axis.values = spread_values(axis.from, axis.to, std::uint64_t(count), axis.scale);
+        if (axis.values.size() < std::uint64_t(count) && axis.scale != Scale::integer)
+            fail(fmt::format("has a range of {} different values of 12 digits, fewer than asked for",
+                             axis.values.size()));
     }
     return axis;
 }
@@ -186,40 +236,16 @@ StopAt parse_stop(const std::string& text) {
 }
 
 SweepOptions read_sweep_file(const std::filesystem::path& path) {
-    SweepOptions options;
-    read_toml_file(path, [&](TomlTable& table) {
-        const std::optional<std::string> scene = table.text("scene");
-        if (!scene && !table.has("scene"))
-            table.report("scene", "the sweep has no scene", "expected scene = \"FILE.toml\"");
-        options.scene_file = path.parent_path() / scene.value_or("");
-        options.overrides = table.texts("set");
-        options.design = Design(table.word("design", {"grid", "list", "random", "latin_hypercube", "sobol"})
-                                    .value_or(std::size_t(Design::grid)));
-        options.points = table.integer("points", 1, 10'000'000).value_or(0);
-        options.replicates =
-            std::uint32_t(table.integer("replicates", 1, 100'000).value_or(options.replicates));
-        options.seed =
-            table.integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(options.seed);
-        options.common_seeds = table.word("seeds", {"per_point", "common"}).value_or(0) == 1;
-        options.clouds_every =
-            int(table.integer("clouds_every", 0, 1'000'000).value_or(std::uint64_t(options.clouds_every)));
-        options.tracks = table.flag("tracks").value_or(false);
-        options.layer = table.text("layer").value_or("");
-        table.table("steps", [&](TomlTable& steps) { read_steps(steps, options.steps); });
-        const std::filesystem::path folder = path.parent_path() / table.text("folder").value_or("");
-        table.tables("axis", [&](TomlTable& axis) { read_axis(axis, folder, options); });
-    });
-    return options;
+    return read_sweep_text(read_text_file(path, kMaxSceneBytes, "scene"), path);
 }
 
-bool is_sweep_file(const std::filesystem::path& path) {
-    bool has_scene = false;
-    try {
-        // What else is in the file is unknown here, and reported by whoever reads it for good.
-        read_toml_file(path, [&](TomlTable& table) { has_scene = table.has("scene"); });
-    } catch (const SceneErrors&) {
-    }
-    return has_scene;
+SweepOptions read_sweep_file_or_scene(const std::filesystem::path& path) {
+    std::string text = read_text_file(path, kMaxSceneBytes, "scene");
+    if (is_sweep_text(text, path)) return read_sweep_text(std::move(text), path);
+    SweepOptions options;
+    options.scene_file = path;
+    options.source.emplace(std::move(text), path);
+    return options;
 }
 
 }  // namespace nephos

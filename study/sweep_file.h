@@ -14,8 +14,10 @@ namespace nephos {
 // folder; the latter to the `folder` that it names. Throws SceneErrors with every problem, Error(io).
 SweepOptions read_sweep_file(const std::filesystem::path& path);
 
-// Returns true for a TOML file with a key `scene`: a sweep file, and no scene. Throws Error(io).
-bool is_sweep_file(const std::filesystem::path& path);
+// Reads a sweep file as above, or a scene: then what it holds is the `source` of the options, which have no axes yet. A file
+// with a key `scene` is a sweep file. The file is read once, so it may be an unnamed pipe. Throws SceneErrors with every
+// problem of a sweep file, Error(io).
+SweepOptions read_sweep_file_or_scene(const std::filesystem::path& path);
 
 // Reads an axis of the command line: "KEY=0.1,0.2,0.3" values, "KEY=0.1..0.4:7" seven values evenly apart,
 // "KEY=log:1e-6..1e-2:5" with even ratios, "KEY=0.1..0.4" and "KEY=log:..", "KEY=integer:3..9" a range for a sampled design;

@@ -11,6 +11,7 @@
 
 #include "study/axis_files.h"
 #include "study/placed_scene.h"
+#include "study/run_statistics.h"
 #include "study/toml_table.h"
 #include <fmt/format.h>
 
@@ -57,10 +58,20 @@ std::string canonical_value(const std::string& value) {
     if (value.empty() || value == "true" || value == "false") return value;
     if (std::string_view("\"'[{").find(value[0]) != std::string_view::npos)
         return canonical_toml(value).value_or(value);
+    const bool has_plus = value[0] == '+' && value.size() > 1 && value[1] != '-';
+    const char *begin = value.data() + has_plus, *end = value.data() + value.size();
+    std::int64_t whole = 0;
+    if (const auto read = std::from_chars(begin, end, whole); read.ec == std::errc() && read.ptr == end) {
+        constexpr std::int64_t kExact = std::int64_t(1) << 53;
+        if (whole < -kExact || whole > kExact)
+            return fmt::format("{}", whole);  // a double may be another number
+    }
     double number = 0;
-    const char* end = value.data() + value.size();
-    const auto [last, error] = std::from_chars(value.data() + (value[0] == '+'), end, number);
+    const auto [last, error] = std::from_chars(begin, end, number);
     if (error == std::errc() && last == end) return number_text(number == 0 ? 0.0 : number);  // one zero only
+    // 0x10 and 1_000 are numbers of TOML, too.
+    const std::optional<std::string> other = canonical_toml(value);
+    if (other && *other != value) return canonical_value(*other);
     return toml_string(value);
 }
 
@@ -123,8 +134,25 @@ void check_options(const SweepOptions& options) {
     if (options.steps.min < 20 || options.steps.max < options.steps.min || options.steps.max > kMaxSteps)
         fail(fmt::format("steps: {}..{} is not a range from 20 steps upwards", options.steps.min,
                          options.steps.max));
+    if (is_sampled(options.design) && options.axes.empty())
+        fail(fmt::format("design '{}': has no axis to take points from: expected --axis KEY=FROM..TO",
+                         design_name(options.design)));
+    if (!is_sampled(options.design) && options.points > 0)
+        fail(fmt::format(
+            "points: a design '{}' has the points of its values: expected no number of points, or a "
+            "sampled design",
+            design_name(options.design)));
+    if (options.steps.until && options.clouds_every == 0 && is_of_snapshots(options.steps.until->statistic))
+        fail(fmt::format(
+            "until: `{}` is of snapshots, and clouds_every = 0 takes none: expected another statistic, or "
+            "--clouds-every N",
+            options.steps.until->statistic));
     for (const Axis& axis : options.axes) {
         const std::string name = "axis " + joined_keys(axis);
+        if (axis.scale == Scale::integer &&
+            (axis.from != std::floor(axis.from) || axis.to != std::floor(axis.to)))
+            fail(fmt::format("{}: has a range of whole numbers from {} to {}, which are not whole", name,
+                             number_text(axis.from), number_text(axis.to)));
         for (const std::string& key : axis.keys) {
             if (key == "seed") fail(name + ": the seed is not an axis: give the number of replicates");
             if (key == "time.steps") fail(name + ": the steps are not an axis: give the range of steps");

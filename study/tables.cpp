@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "study/folder_contents.h"
 #include "study/netcdf_file.h"
 #include "study/placed_scene.h"
 #include "study/student.h"
@@ -197,11 +198,42 @@ class UnpackedSeries {
     std::vector<float> current_;
 };
 
+// Where the values of a run lie.
+struct RunCoordinates {
+    double step_s, floor_m, level_m;
+    bool operator==(const RunCoordinates&) const = default;
+};
+
+RunCoordinates coordinates_of(const Scene& scene, std::size_t lattice) {
+    const AutomatonOptions options = automaton_options(scene, lattice);
+    return {options.time_step_s, options.placement.origin_m.z, options.placement.cell_size_m};
+}
+
+// Returns those of each run, or one where all runs have the same.
+std::vector<RunCoordinates> coordinates_of(const SweepPlan& plan, const std::vector<DoneRun>& done) {
+    const std::size_t lattice = plan.measured_lattice();
+    const auto may_move = [](const Axis& axis) {
+        return std::ranges::any_of(axis.keys, [](const std::string& key) {
+            return key.starts_with("time") || key.starts_with("lattice") || key.starts_with("layer");
+        });
+    };
+    if (std::ranges::none_of(plan.options().axes, may_move)) return {coordinates_of(plan.scene(), lattice)};
+    std::vector<RunCoordinates> all;
+    for (std::size_t n = 0; n < done.size(); ++n)
+        all.push_back(n > 0 && done[n].run.point == done[n - 1].run.point
+                          ? all.back()
+                          : coordinates_of(plan.scene_of(done[n].run), lattice));
+    if (std::ranges::all_of(all, [&](const RunCoordinates& one) { return one == all.front(); }))
+        all.resize(1);
+    return all;
+}
+
 // Names the auxiliary coordinates of every variable over runs that is not one of them (CF 1.8, section 5).
 void add_coordinates(std::vector<NetcdfVariable>& variables, const std::string& of_run) {
     constexpr std::string_view kOfDimension[] = {"", " time", " height", " size_bin_begin"};
     for (NetcdfVariable& variable : variables) {
-        const bool is_coordinate = (" " + of_run + " ").find(" " + variable.name + " ") != std::string::npos;
+        const bool is_coordinate =
+            (" " + of_run + " time height ").find(" " + variable.name + " ") != std::string::npos;
         if (variable.dimensions.front() != 0 || is_coordinate) continue;
         const std::size_t other = variable.dimensions.size() > 1 ? variable.dimensions[1] : 0;
         variable.attributes.emplace_back("coordinates", of_run + std::string(kOfDimension[other]));
@@ -223,7 +255,7 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
     }
     if (done.empty()) return remove_table(path);
     levels = std::max<std::size_t>(levels, 1);
-    const Placement placement = automaton_options(plan.scene(), plan.measured_lattice()).placement;
+    const std::vector<RunCoordinates> coordinates = coordinates_of(plan, done);
     const std::vector<NetcdfDimension> dimensions{{"run", done.size()},
                                                   {"step", steps + 1},
                                                   {"level", levels},
@@ -274,16 +306,20 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
                                          })));
         }
     }
-    variables.push_back(variable("time", NetcdfType::float64, {1},
+    const auto in_runs = [&](std::size_t dimension) {
+        return coordinates.size() == 1 ? std::vector{dimension} : std::vector<std::size_t>{0, dimension};
+    };
+    variables.push_back(variable("time", NetcdfType::float64, in_runs(1),
                                  described("s", "simulated time since the start"), [&](const Put& put) {
-                                     for (std::uint64_t n = 0; n <= steps; ++n)
-                                         put(double(n) * plan.scene().automaton.time_step_s);
+                                     for (const RunCoordinates& run : coordinates)
+                                         for (std::uint64_t n = 0; n <= steps; ++n)
+                                             put(double(n) * run.step_s);
                                  }));
-    variables.push_back(variable("height", NetcdfType::float64, {2},
+    variables.push_back(variable("height", NetcdfType::float64, in_runs(2),
                                  described("m", "centre of the level", "height"), [&](const Put& put) {
-                                     for (std::size_t k = 0; k < levels; ++k)
-                                         put(placement.origin_m.z +
-                                             (double(k) + 0.5) * placement.cell_size_m);
+                                     for (const RunCoordinates& run : coordinates)
+                                         for (std::size_t k = 0; k < levels; ++k)
+                                             put(run.floor_m + (double(k) + 0.5) * run.level_m);
                                  }));
     variables.push_back(variable("size_bin_begin", NetcdfType::float64, {3},
                                  described("1", "smallest area of the bin, in columns"), [&](const Put& put) {
@@ -328,9 +364,10 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
                      }));
     }
     add_coordinates(variables, of_run);
-    write_netcdf(path, dimensions,
-                 {{"Conventions", "CF-1.8"}, {"title", "nephos sweep"}, {"source", "nephos " + version()}},
-                 variables);
+    write_netcdf(
+        path, dimensions,
+        {{"Conventions", "CF-1.8"}, {"title", std::string(kSweepTitle)}, {"source", "nephos " + version()}},
+        variables);
 }
 
 void write_manifest(const SweepPlan& plan, const Records& records, const std::filesystem::path& path) {
@@ -434,7 +471,8 @@ LostRuns runs_lost(const SweepPlan& plan, const Records& records, const std::fil
     std::ifstream table(path);
     std::set<std::string, std::less<>> ids;  // of runs that are in a record
     for (std::string line; std::getline(table, line);) {
-        if (line.find(",done,") == line.npos) continue;
+        // The last column, state_hash, has a value where the run is done.
+        if (line.starts_with("run,") || line.ends_with(',')) continue;
         std::string id = line.substr(0, line.find(','));
         const RunRecord* record = records.find(id);
         if (record == nullptr || record->failed)

@@ -250,20 +250,22 @@ std::optional<std::string> canonical_toml(std::string_view value) {
     return value_text(node);
 }
 
-void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read,
-                    std::string_view kind) {
-    std::string text = read_text_file(path, kMaxFileBytes, kind);
+void read_toml_text(std::string text, const std::string& label, const std::function<void(TomlTable&)>& read) {
     if (text.size() > kMaxFileBytes)
-        throw Error(ErrorCode::usage,
-                    fmt::format("{}: is larger than {} bytes", path.string(), kMaxFileBytes));
+        throw Error(ErrorCode::usage, fmt::format("{}: is larger than {} bytes", label, kMaxFileBytes));
     Document document;
-    const int origin = document.add_origin(path.string(), std::move(text), true);
+    const int origin = document.add_origin(label, std::move(text), true);
     if (const std::optional<Node> root = document.parse(origin)) {
         TomlTable table(document, *root, {});
         read(table);
     }
-    if (document.is_full()) throw_problems(std::move(document.problems), path.string());
+    if (document.is_full()) throw_problems(std::move(document.problems), label);
     if (!document.problems.empty()) throw SceneErrors(std::move(document.problems));
+}
+
+void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read,
+                    std::string_view kind) {
+    read_toml_text(read_text_file(path, kMaxFileBytes, kind), path.string(), read);
 }
 
 }  // namespace nephos

@@ -55,7 +55,10 @@ class TomlTable {
 // texts as study files write them. Nothing where the text is not one value, or has a date or time in it.
 std::optional<std::string> canonical_toml(std::string_view value);
 
-// Reads a file into a table; messages call it by its `kind`. Throws SceneErrors with the problems, Error(io).
+// Reads a text into a table; `label` names it in messages. Throws SceneErrors with the problems.
+void read_toml_text(std::string text, const std::string& label, const std::function<void(TomlTable&)>& read);
+
+// Reads a file likewise; messages call it by its `kind`. Throws SceneErrors with the problems, Error(io).
 void read_toml_file(const std::filesystem::path& path, const std::function<void(TomlTable&)>& read,
                     std::string_view kind = "scene");
 

@@ -6,6 +6,7 @@
 
 #include <memory>
 
+#include "study/folder_contents.h"
 #include "study/sweep.h"
 #include <fmt/format.h>
 
@@ -36,6 +37,7 @@ int report(const ReportArguments& a) {
                         "merge` made are shown by `nephos report` of the folders that were merged");
     const std::filesystem::path out = a.out.empty() ? std::filesystem::path(a.folders.front()) / "report.html"
                                                     : std::filesystem::path(a.out);
+    if (a.out.empty()) require_own(out, kReportBeginning, "`nephos report`");
     write_report(plan, records, out);
     for (const std::string& problem : records.problems()) print_error(problem);
     if (!a.work.quiet)

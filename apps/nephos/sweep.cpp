@@ -69,16 +69,11 @@ void parse_shard(const std::string& text, SweepArguments& a) {
 
 // A sweep file, or a scene with axes; what the command line names comes on top of both.
 SweepOptions options_of(const SweepArguments& a) {
-    SweepOptions options;
-    if (is_sweep_file(a.scene.file)) {
-        options = read_sweep_file(a.scene.file);
-    } else {
-        options.scene_file = a.scene.file;
-        if (!a.steps) {
-            const std::uint64_t steps =
-                std::max<std::uint64_t>(20, load_scene(a.scene, SceneUse::without_frames).steps);
-            options.steps = {steps, 10 * steps, {}};
-        }
+    SweepOptions options = read_sweep_file_or_scene(a.scene.file);
+    if (options.source && !a.steps) {
+        const Scene scene = options.source->read(a.scene.overrides, SceneUse::without_frames);
+        const std::uint64_t steps = std::max<std::uint64_t>(20, scene.steps);
+        options.steps = {steps, 10 * steps, {}};
     }
     options.overrides.insert(options.overrides.end(), a.scene.overrides.begin(), a.scene.overrides.end());
     for (const std::string& axis : a.axes) options.axes.push_back(parse_axis(axis));

@@ -198,11 +198,7 @@ std::string report_page(const SweepPlan& plan, const Records& records) {
     const ReportData data = gather(plan, records);
     const std::string title =
         html("Sweep of " + (plan.scene().name.empty() ? std::string("a scene") : plan.scene().name));
-    std::string page =
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
-        "style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n"
-        "<meta name=\"viewport\" content=\"width=device-width\">\n";
+    std::string page(kReportBeginning);
     page += fmt::format("<title>{}</title>\n<style>\n{}\n{}</style>\n</head>\n<body>\n", title, kPlotCss,
                         kPageCss);
     page +=

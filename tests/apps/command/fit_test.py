@@ -106,6 +106,19 @@ class Fit(Case):
         self.call("fit", file, "--out", "fit", "-j", "2", "--overwrite")
         self.assertEqual((self.folder / "fit/fit.json").read_bytes(), before)
 
+    def test_a_file_that_is_missing_is_one_that_cannot_be_read(self):
+        """The status is that of the scene or mask itself, 3; with another problem beside it 2."""
+        self.write("null.toml", NULL)
+        missing = FIT.replace('scene = "null.toml"', 'scene = "nothere.toml"')
+        self.assertNotEqual(missing, FIT)
+        said = self.call("fit", self.write("bad.toml", missing), "--out", "bad", status=3).stderr
+        self.assertIn("bad.toml:1:", said)
+        self.assertIn("nothere.toml", said)
+        target = '[[target]]\nstatistic = "cover"\nfrom = "nothere.nc"\nsd = 0.1\n'
+        of_mask = FIT[:FIT.index("[[target]]")] + target
+        self.assertIn("nothere.nc", self.call("fit", self.write("bad.toml", of_mask), "--out", "bad", status=3).stderr)
+        self.call("fit", self.write("bad.toml", "rums = 9\n" + of_mask), "--out", "bad", status=2)
+
     def said_at(self, text, place, *says):
         """A fit file that is refused at a place, by its own words."""
         said = self.call("fit", self.write("bad.toml", text), "--out", "bad", status=2).stderr

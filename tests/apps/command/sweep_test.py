@@ -313,6 +313,19 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
                     self.refused(2, "sweep", *arguments, "--out", "twice", "--design", "list", says="points 1 and 2 of the list are the same")
         self.assertFalse((self.folder / "twice").exists())
 
+    def test_a_scene_or_sweep_file_may_come_through_a_pipe(self):
+        self.sweep("file", "-j", "2", steps="40")
+        arguments = ["--axis", "field.background.ext=0.05,0.1,0.2", "--replicates", "3", "--steps", "40", "-j", "2"]
+        plan = f'scene = "{self.null}"\nreplicates = 3\nsteps = {{ min = 40, max = 40 }}\n' \
+               '[[axis]]\nkey = "field.background.ext"\nvalues = [0.05, 0.1, 0.2]\n'
+        for name, text, more in (("scene", 'name = "null"\n' + NULL, arguments), ("plan", plan, [])):
+            with self.subTest(name):
+                done = subprocess.run([NEPHOS, "sweep", "/dev/stdin", *more, "--out", name], input=text, text=True,
+                                      cwd=self.folder, env=self.environment, capture_output=True, timeout=120)
+                self.assertEqual((done.returncode, done.stderr.count("error")), (0, 0), done.stderr)
+                self.assertEqual((self.folder / name / "runs.csv").read_bytes(),
+                                 (self.folder / "file/runs.csv").read_bytes())
+
     def test_files_of_a_scene_are_found_from_the_folder_of_the_sweep(self):
         self.call("run", self.null, "--no-render", "--set", "density.write_state=true", "--set", "frames.count=1", "--set",
                   "time.steps=2", "--out", "w")
@@ -496,6 +509,56 @@ sd = 0.05
         self.refused(2, "fit", fit, "--out", "own-fit", "--quiet", says="own-fit/fitted.toml: is there, but a fit did not write it")
         self.assertEqual(pathlib.Path(mine).read_text(), "mine")
 
+    def test_names_of_files_go_back_through_links_as_the_system_does(self):
+        """In a scene, in one that is reached through a link, in its models, as a value of an axis, and in a plan."""
+        for folder in ("real/scenes", "real/data", "here/data", "here/models", "real/models"):
+            (self.folder / folder).mkdir(parents=True)
+        (self.folder / "here/link").symlink_to("../real/scenes")
+        for name, hum in (("real/data/x.vdb", 0.1), ("here/data/x.vdb", 0.9)):
+            self.call("state", self.null, "--steps", "1", "--set", f"field.background.hum={hum}", "--out", name)
+        started = NULL.replace('initial = "empty"', 'initial_state = "{}"')
+        self.write("real/scenes/a.toml", started.format("../data/x.vdb"))
+        self.write("here/a.toml", started.format("link/../data/x.vdb"))
+        right, other = (self.hashes(self.write("at.toml", started.format(name)), "--steps", "3")
+                        for name in ("real/data/x.vdb", "here/data/x.vdb"))
+        self.assertNotEqual(right, other)
+        for scene in ("real/scenes/a.toml", "here/link/a.toml", "here/a.toml", "here/link/../scenes/a.toml"):
+            self.assertEqual(self.hashes(scene, "--steps", "3"), right, scene)
+        for name, sun in (("real", 30), ("here", 60)):
+            self.write(f"{name}/models/m.toml", f'[[model]]\nname = "of {name}"\nlevels = 3\n')
+        self.write("real/scenes/m.toml", 'models = ["../models/m.toml"]\n' + NULL)
+        for folder in ("real/scenes", "here/link"):
+            said = self.call("validate", f"{folder}/m.toml", status=2).stderr
+            self.assertIn("real/models/m.toml", said)
+            self.assertNotIn("here/models/m.toml", said)
+        steps = ("--replicates", "1", "--steps", "20")
+        for number, (scene, value) in enumerate((("here/a.toml", "here/link/../data/x.vdb"), ("real/scenes/a.toml", "real/data/x.vdb"))):
+            self.call("sweep", scene, "--axis", f"lattice.initial_state={value}", *steps, "--out", f"o{number}")
+        self.assertEqual((self.folder / "o0/series.nc").read_bytes(), (self.folder / "o1/series.nc").read_bytes())
+        (self.folder / "o2").symlink_to("o1")  # one folder by two names
+        before = self.tables("o1")
+        self.assertIn('"before": 1', self.call("sweep", "o2/sweep.toml", "--out", "o2", "--json").stdout)
+        for shard in ("o3", "o4"):
+            (self.folder / "o3").mkdir(exist_ok=True)
+            if shard == "o4":
+                (self.folder / "o4").symlink_to("o3")
+            self.call("sweep", "real/scenes/a.toml", "--axis", "field.background.ext=0.1,0.2", *steps, "--out", shard, "--shard",
+                      f"{int(shard[1]) - 3}/2")
+        self.call("merge", "o4")
+        self.assertEqual(self.tables("o1"), before)
+
+    def test_a_folder_whose_name_no_scene_can_hold(self):
+        self.call("state", self.null, "--steps", "1", "--out", "x.vdb")
+        folder = os.fsencode(self.folder) + b"/\xff"
+        os.mkdir(folder)
+        os.rename(self.folder / "x.vdb", folder + b"/x.vdb")
+        with open(folder + b"/a.toml", "w") as file:
+            file.write(NULL.replace('initial = "empty"', 'initial_state = "x.vdb"'))
+        call = subprocess.run([os.fsencode(NEPHOS), b"sweep", folder + b"/a.toml", b"--replicates", b"1", b"--steps", b"20", b"--quiet",
+                               b"--out", b"no"], cwd=self.folder, env=self.environment, capture_output=True)
+        self.assertEqual(call.returncode, 2, call.stderr)
+        self.assertIn(b"x.vdb: its name is no UTF-8", call.stderr)
+
     def test_a_file_that_is_exchanged_meanwhile(self):
         for name, hum in (("a.vdb", 0.1), ("b.vdb", 0.9)):
             self.call("state", self.null, "--steps", "1", "--set", f"field.background.hum={hum}", "--out", name)
@@ -548,7 +611,48 @@ sd = 0.05
         self.refused(2, "sweep", self.null, *axis, "", says="expected the path of a folder")
         self.refused(2, "sweep", self.null, "--seed", 2**63, *axis, "large", says="is not from 0 to 9223372036854775807")
         self.refused(2, "sweep", self.null, *axis, "both", "--emit", "slurm", "--shard", "0/2", says="leave out --shard")
+        # Beside records, too, whether complete or killed in the first runs.
+        self.call("sweep", self.null, *axis, "mixed")
+        shutil.copytree(self.folder / "mixed", self.folder / "killed")
+        for name in ("runs.csv", "points.csv", "failures.csv", "series.nc", "manifest.json"):
+            (self.folder / "killed" / name).unlink()
+        for folder in ("mixed", "killed"):
+            for name in ("scene.toml", "sweep.toml", "runs.csv", "points.csv", "failures.csv", "tracks.csv", "series.nc"):
+                path = self.folder / folder / name
+                before = path.read_bytes() if path.exists() else None
+                path.write_text("mine")
+                self.refused(2, "sweep", "--quiet", self.null, *axis, folder, says=f"{folder}/{name}: is there")
+                self.assertEqual(path.read_text(), "mine")
+                path.unlink() if before is None else path.write_bytes(before)
+            self.call("sweep", self.null, *axis, folder)
+        (self.folder / "mixed/report.html").write_text("mine")
+        self.refused(2, "report", "mixed", says="mixed/report.html: is there")
+        self.call("report", "mixed", "--out", "mixed/report.html")
+        self.call("report", "mixed")
+        # Files beside the records, and such as have their names.
+        texts = {"train-000.jsonl": '{"my": 1}\n{"my": 2}\n', "train-000.series": "mine"}
+        for name, text in texts.items():
+            self.write(f"dataset/shards/{name}", text)
+        for more in ((), ("--overwrite",)):
+            self.call("sweep", self.null, *axis, "dataset", *more)
+        for name, text in texts.items():
+            self.assertEqual((self.folder / "dataset/shards" / name).read_text(), text)
+        for name, text in (("0000-of-0001.jsonl", '{"my": 1}\n'), ("0000-of-0001.series", "mine")):
+            for more in ((), ("--overwrite",)):
+                mine = pathlib.Path(self.write(f"named-{name}/shards/{name}", text))
+                self.refused(2, "sweep", "--quiet", self.null, *axis, f"named-{name}", *more, says=f"{name}: is there")
+                self.assertEqual(mine.read_text(), text)
+        # Tables of one plan do not go beside records of another one.
+        self.call("sweep", self.null, "--axis", "field.background.hum=0.1,0.2", "--replicates", "8", "--steps", "20", "--shard", "0/2",
+                  "--out", "other")
+        self.refused(2, "merge", "swept", "--out", "other", says="other: holds the records of a sweep of another plan")
         # What a sweep left is its own: with and without records, and a plan that was made only.
+        shutil.copytree(self.folder / "killed", self.folder / "begun")
+        for name in ("runs.csv", "points.csv", "failures.csv", "series.nc", "manifest.json"):
+            (self.folder / "begun" / name).unlink()
+        shutil.rmtree(self.folder / "begun/shards")
+        (self.folder / "begun/timing.csv").write_text("")
+        self.call("sweep", self.null, *axis, "begun")
         self.call("merge", "swept", "--out", "tables")
         for folder in ("swept", "tables"):
             self.call("sweep", self.null, *axis, folder)
@@ -812,7 +916,14 @@ sd = 0.05
                                 (["--shard", "3/3"], "'3'"),
                                 (["--steps", "5"], "'5'"),
                                 (["--design", "hypercube"], "latin_hypercube"),
-                                (["--layer", "low"], "no layers")):
+                                (["--layer", "low"], "no layers"),
+                                (["--points", "3"], "has no axis to take points from"),
+                                (["--axis", "field.background.ext=0.1,0.2", "--design", "list", "--points", "7"], "has the points of its values"),
+                                (["--axis", "lattice.cells[0]=integer:10.5..13.5", "--points", "3"], "which are not whole"),
+                                (["--axis", "field.background.act=log:5e-324..1:5"], "spans more than numbers do"),
+                                (["--axis", "field.background.ext=0.1..0.1000000000000001:5"], "a range of 1 different values of 12 digits"),
+                                (["--axis", "field.background.ext=+-0.1,0.2"], 'is the text "+-0.1"'),
+                                (["--clouds-every", "0", "--until", "clouds_per_km2.se=1"], "is of snapshots, and clouds_every = 0 takes none")):
             with self.subTest(arguments=arguments):
                 self.assertIn(says, self.call("sweep", self.null, *arguments, "--out", "bad", status=2).stderr)
         self.assertFalse((self.folder / "bad").exists())
@@ -936,6 +1047,41 @@ sd = 0.05
         keys = json.loads((self.folder / "a/manifest.json").read_text())["parameters"]
         self.assertEqual((keys["field.background.act"], keys["lattice.cells"], keys["field.background.hum"]), ("0.002", "[64, 64, 10]", "0.0"))
         self.assertIn("density.refine", keys)
+
+    def test_series_of_runs_with_other_steps_and_cells(self):
+        from scipy.io import netcdf_file
+        self.call("sweep", self.null, "--axis", "time.step_s=10,20", "--axis", "lattice.cell_size_m=50,100", "--replicates", "2", "--steps",
+                  "400", "--out", "a")
+        with netcdf_file(self.folder / "a/series.nc", mmap=False) as file:
+            time, height = file.variables["time"], file.variables["height"]
+            self.assertEqual((time.dimensions, height.dimensions), (("run", "step"), ("run", "level")))
+            for number, run in enumerate(rows(self.folder / "a/runs.csv")):
+                step_s, cell_m = float(run["time.step_s"]), float(run["lattice.cell_size_m"])
+                self.assertEqual([float(value) for value in time[number]], [n * step_s for n in range(401)])
+                self.assertEqual([float(value) for value in height[number]], [(k + 0.5) * cell_m for k in range(10)])
+            for name in ("time", "height"):
+                self.assertFalse(hasattr(file.variables[name], "coordinates"))
+            self.assertTrue(file.variables["cloud_area_fraction"].coordinates.decode().endswith(" time"))
+
+    def test_numbers_of_toml_are_values_of_an_axis(self):
+        steps = ("--replicates", "1", "--steps", "20", "--out")
+        self.call("sweep", self.null, "--axis", "time.step_s=0x10,1_0", *steps, "a")
+        self.assertEqual([run["time.step_s"] for run in rows(self.folder / "a/runs.csv")], ["16", "10"])
+        large = ("9007199254740993", "9007199254740992", "-9007199254740993")
+        said = self.call("sweep", self.null, "--axis", "lattice.cells[0]=" + ",".join(large), *steps, "b", status=2).stderr
+        self.assertIn(f"--set lattice.cells[0]={large[0]}: error", said)
+
+    def test_a_value_that_looks_like_a_status(self):
+        self.call("state", self.null, "--steps", "1", "--out", "a,done,b.vdb")
+        self.call("state", self.null, "--steps", "2", "--out", "c.vdb")
+        started = self.write("started.toml", NULL.replace('initial = "empty"', 'initial_state = "c.vdb"'))
+        sweep = ("sweep", started, "--axis", "lattice.initial_state='a,done,b.vdb',c.vdb", "--replicates", "4", "--steps", "20", "--out", "o")
+        self.call(*sweep, "--shard", "0/2")
+        for _ in range(2):  # half of the runs are missing, and are not lost
+            self.call("merge", "o")
+        self.call(*sweep, "--shard", "1/2")
+        self.call("merge", "o")
+        self.assertEqual({run["status"] for run in rows(self.folder / "o/runs.csv")}, {"done"})
 
     def test_the_files_of_the_page_work(self):
         page = SOURCE / "docs/research"
