@@ -84,7 +84,7 @@ void require_fit_folder(const fs::path& folder) {
     require_own(folder / "fit.json", kFit, "a fit");
     if (begins_with(folder / "fit.json", kFit)) return;
     require_own(folder / "fitted.toml", kWrittenByFit, "a fit");
-    // Its columns are keys of a scene; it is written after fitted.toml.
+    // Its columns are keys of a scene; it is written after the fitted scene.
     if (!begins_with(folder / "fitted.toml", kWrittenByFit))
         require_absent(folder / "posterior.csv", "a fit");
 }

@@ -8,7 +8,7 @@
 
 namespace nephos {
 
-// The title of a sweep's series.nc, and the first line of a fit's fitted.toml; kWrittenBySweep is that of a sweep's TOML.
+// The title of a sweep's series.nc, and the first line of a fit's scene; kWrittenBySweep is that of a sweep's TOML.
 inline constexpr std::string_view kSweepTitle = "nephos sweep", kWrittenByFit = "# Written by nephos fit.\n";
 
 // Throws Error(usage) that names a file in the folder which a sweep would replace and no sweep wrote, as a scene or a plan

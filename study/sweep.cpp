@@ -297,14 +297,7 @@ std::uint64_t unused_records(const SweepPlan& plan, const Records& records) {
 }
 
 void write_plan_of_tables(const SweepPlan& plan, const std::filesystem::path& folder) {
-    if (!has_shards(folder)) {
-        place_plan(plan, folder);
-    } else if (!is_plan_of(plan, folder)) {
-        throw Error(ErrorCode::usage,
-                    folder.string() +
-                        ": holds the records of a sweep of another plan: expected another --out "
-                        "for these tables");
-    }
+    if (!has_shards(folder)) place_plan(plan, folder);
 }
 
 }  // namespace nephos

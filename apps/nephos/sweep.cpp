@@ -297,6 +297,10 @@ int merge(const MergeArguments& a) {
                     fmt::format("{}/runs.csv has {} runs that {}/sweep.toml does not ask for: the tables of "
                                 "another plan stay as they are; --overwrite replaces them",
                                 out, lost.of_another_plan, a.folders.front()));
+    if (!a.overwrite && has_shards(out) && !is_plan_of(plan, out))
+        throw Error(ErrorCode::usage, out + ": holds the records of a sweep of another plan than " +
+                                          a.folders.front() +
+                                          ": expected another --out for these tables, or --overwrite");
     const std::string sources = fmt::format("{}", fmt::join(a.folders, " "));
     if (!a.work.quiet) print_unused(unused_records(plan, records), sources);
     const bool in_place = a.folders.size() == 1 && out == a.folders.front();
@@ -316,6 +320,8 @@ void add_sweep_command(CLI::App& app, Action& action) {
         ->required()
         ->type_name("SCENE");
     add_scene_changes(*command, a->scene);
+    command->get_option("--seed")->description(
+        "Seed that those of all runs are made of (default: 1); the scene's is not used");
     add_out_folder(*command, a->out, "Folder to write to (default: out/sweep-NAME)");
     command
         ->add_option("--axis", a->axes,

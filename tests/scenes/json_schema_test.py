@@ -21,7 +21,7 @@ ACCEPTED_BY_THE_SCHEMA = {
     "camera_point", "empty", "only_comment", "frames_beyond", "frames_start", "frames_too_many", "name",
     "name_empty", "periodic_size", "shells_far", "wind_order", "wind_times", "wind_too_fast",
     "density_grids", "field_order", "frames_of_steps", "layers_without_automaton", "model_textures", "place_start",
-    "tile_lattice", "tile_layers", "wind_fields_height",
+    "tile_lattice", "tile_layers", "wind_fields_height", "detail_sizes", "many_ellipsoids",
 }
 
 

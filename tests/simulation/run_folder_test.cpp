@@ -276,6 +276,9 @@ TEST_F(RunFolderTest, AnEarlierRunOfTheSameNameIsReplaced) {
     std::ofstream(s.folder / "density/other_0001.vdb") << "mine";
     RunSettings shorter = s;
     shorter.range = range_of_frames(s.scene, 1, 2);
+    EXPECT_THROW(run_scene(shorter, {}), Error) << "three frames would be lost";
+    EXPECT_TRUE(fs::exists(s.folder / "density/small_0003.vdb"));
+    shorter.overwrite = true;
     ASSERT_TRUE(run_scene(shorter, {}).complete);
     EXPECT_TRUE(fs::exists(s.folder / "density/small_0002.vdb"));
     EXPECT_FALSE(fs::exists(s.folder / "density/small_0003.vdb"));

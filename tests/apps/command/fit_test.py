@@ -119,9 +119,9 @@ class Fit(Case):
         self.assertIn("nothere.nc", self.call("fit", self.write("bad.toml", of_mask), "--out", "bad", status=3).stderr)
         self.call("fit", self.write("bad.toml", "rums = 9\n" + of_mask), "--out", "bad", status=2)
 
-    def said_at(self, text, place, *says):
+    def said_at(self, text, place, *says, status=2):
         """A fit file that is refused at a place, by its own words."""
-        said = self.call("fit", self.write("bad.toml", text), "--out", "bad", status=2).stderr
+        said = self.call("fit", self.write("bad.toml", text), "--out", "bad", status=status).stderr
         line = next(n for n, row in enumerate(text.splitlines(), 1) if place in row)
         self.assertRegex(said, rf"bad.toml:{line}:\d+: error: ")
         self.assertIn(f"\n {line} | {place}", said)
@@ -150,7 +150,7 @@ class Fit(Case):
         self.said_at(FIT.replace("ground.ext", "ground.exd"), "key = ", "did you mean `ext`")
         self.said_at(FIT.replace("field.background.ext", "time.steps"), "key = ", "`time.steps` is no parameter of a fit")
         self.said_at(FIT.replace("null.toml", "nothere.toml"), "scene = ", "nothere.toml: cannot read the scene: No such file",
-                     "relative to the folder of this file")
+                     "relative to the folder of this file", status=3)
         self.said_at('layer = "low"\n' + FIT, "layer = ", "has no layers")
         self.said_at('set = "field.background.hum=2"\n' + FIT, "set = ", "`field.background.hum` is 2, too large")
         self.said_at(FIT.replace('"cover"', '"clouds_per_km2"'), "statistic = ", "clouds_every = 0 takes none")

@@ -85,7 +85,8 @@ class State(Case):
         manifest = json.loads((self.folder / "out/manifest.json").read_text())
         self.call("state", self.scene, "--steps", "5", "--out", "state.vdb")
         self.refused(2, "run", scene, "--no-render", "--out", "out", "--resume", says="the initial state differs")
-        self.call("run", scene, "--no-render", "--out", "out")
+        self.refused(2, "run", scene, "--no-render", "--out", "out", says="another content of state.vdb of `lattice.initial_state`")
+        self.call("run", scene, "--no-render", "--out", "out", "--overwrite")
         again = json.loads((self.folder / "out/manifest.json").read_text())
         self.assertNotEqual(manifest["scene"]["simulation_hash"], again["scene"]["simulation_hash"])
 

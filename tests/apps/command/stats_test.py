@@ -401,7 +401,7 @@ class Stats(Case):
             self.call("state", "null.toml", "--steps", 300 + 60 * n, "--set", "field.background.ext=0.08", "--out", f"{n}.vdb")
         self.check_target("from = \"0.vdb\"\nsd = 0.004\nperiodic = [\"x\", \"y\"]")
         self.refused_fit("from = \"0.vdb\"", "expected sd")
-        self.refused_fit("from = \"no.vdb\"\nsd = 0.1", "no.vdb")
+        self.refused_fit("from = \"no.vdb\"\nsd = 0.1", "no.vdb", status=3)
         self.refused_fit("from = \"0.vdb\"\nsd = 0.1\nvalue = 0.3", "both value and from")
         self.refused_fit("from = \"0.vdb\"\nsd = 0.1\ntreshold = 0.3", "threshold")
         self.refused_fit("from = \"0.vdb\"\nsd = 0.1\nperiodic = [\"z\"]", "'z' is no axis of a mask")
@@ -507,11 +507,11 @@ sd = 20
     def with_target(self, text):
         return self.write("fit.toml", FIT.replace("value = 0.3\nsd = 0.003\n", text + "\n"))
 
-    def refused_fit(self, text, says, statistic="cover", clouds_every=0):
+    def refused_fit(self, text, says, statistic="cover", clouds_every=0, status=2):
         path = self.with_target(text)
         fit = (self.folder / "fit.toml").read_text().replace("\"cover\"", f"\"{statistic}\"")
         (self.folder / "fit.toml").write_text(fit.replace("clouds_every = 0", f"clouds_every = {clouds_every}"))
-        result = self.call("fit", path, status=2)
+        result = self.call("fit", path, status=status)
         self.assertIn(says, result.stderr)
         self.assertIn("fit.toml:", result.stderr)
         return result.stderr
