@@ -187,7 +187,8 @@ void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
 }
 
 Check check_seams(const RunListing& run, const DensityGrid& grid, bool all) {
-    if (is_too_large(grid)) return {"seam", true, not_compared(grid)};
+    if (is_too_large(grid))
+        return {"seam", !all, not_compared(grid), {}, !all};  // asked for, it has not passed
     const Vec3 period = period_m(run.scene, std::nullopt);
     const std::vector<float> density = grid.to_dense();
     Check check{"seam", true, {}};
@@ -253,8 +254,12 @@ class Frames {
         }
         if (!last_) return;
         checks.push_back(check_seams(run_, *last_, options.seam));
-        checks.push_back(is_too_large(*last_) ? Check{"motion", true, not_compared(*last_)}
-                                              : motion_.check(options.max_change));
+        if (is_too_large(*last_)) {
+            const bool is_asked = options.max_change.has_value();
+            checks.push_back({"motion", !is_asked, not_compared(*last_), {}, !is_asked});
+        } else {
+            checks.push_back(motion_.check(options.max_change));
+        }
     }
 
   private:

@@ -4,6 +4,7 @@
 
 #include "simulation/verify.h"
 
+#include <algorithm>
 #include <memory>
 
 #include <fmt/format.h>
@@ -60,9 +61,11 @@ int verify(const VerifyArguments& a) {
     }
     output.flush();
     if (result.passed()) return 0;
-    if (!result.failed())
-        throw Error(ErrorCode::io,
-                    a.folder + ": nothing is wrong, but the run cannot be simulated anew: see `replay`");
+    if (!result.failed()) {
+        const auto none = std::ranges::find(result.checks, false, &Check::done);
+        throw Error(ErrorCode::io, fmt::format("{}: nothing is wrong, but the check `{}` could not be done", a.folder,
+                                               none == result.checks.end() ? "" : none->name));
+    }
     throw Error(ErrorCode::check, a.folder + ": the " + result.kind + " is not what it claims to be");
 }
 

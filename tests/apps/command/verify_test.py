@@ -195,6 +195,17 @@ class Verify(Case):
             overrides = [word for change in changes for word in ("--set", change)]
             self.assertIn(says, self.call("run", scene, *overrides, status=2).stderr)
 
+    def test_layers_that_lie_far_apart(self):
+        """Their common box has more voxels than are compared one by one, which is said, and asked for is no success."""
+        scene = self.write("far.toml", LAYERED.replace("[0, 0, 900]", "[200000, 200000, 900]"))
+        self.call("run", scene, "--no-render", "--out", "far")
+        checks = self.checks("far")
+        for name in ("layers", "seam", "motion"):
+            self.assertRegex(checks[name]["detail"], r"not done: the box has \d+ voxels, of which at most 268435456 are compared")
+        for arguments, name in ((["--max-change", "0.5"], "motion"), (["--seam"], "seam")):
+            report = self.call("verify", "far", *arguments, status=3)
+            self.assertIn(f"the check `{name}` could not be done", report.stderr)
+
 
 class Replay(Case):
     """Frames simulated anew, of runs that take more than their scene's text."""
@@ -239,7 +250,7 @@ class Replay(Case):
         for folder in ("relative", "full", "absolute"):
             detail, errors = self.replay(folder, status=3)
             self.assertIn("cannot be done: the content is not as it was: state.vdb of `lattice.initial_state`", detail)
-            self.assertIn("cannot be simulated anew", errors)
+            self.assertIn("the check `replay` could not be done", errors)
         (self.folder / "in/state.vdb").unlink()
         for folder in ("relative", "full", "absolute"):
             detail, _ = self.replay(folder, status=3)
