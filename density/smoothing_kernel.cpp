@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <new>
 
 // Machines without AVX2 run the portable form: rare by now, and every target costs seconds to compile.
 #if defined(__OPTIMIZE__) && !defined(HWY_DISABLED_TARGETS)  // with -O0 as all files (docs/determinism.md)
@@ -27,6 +28,14 @@ namespace {
 constexpr int kMaxRadius = 16;
 constexpr int kLag = 8;  // rows between a row's expansion and its sum
 
+// hwy::AllocateAligned() returns null where there is no memory.
+template <class T>
+hwy::AlignedFreeUniquePtr<T[]> aligned(std::size_t count) {
+    auto memory = hwy::AllocateAligned<T>(count);
+    if (memory == nullptr) throw std::bad_alloc();
+    return memory;
+}
+
 template <class T>
 std::vector<T> as(const std::vector<std::uint32_t>& weights) {
     return std::vector<T>(weights.begin(), weights.end());
@@ -50,10 +59,10 @@ class TilePass {
           groups_(tile.rows / 8),
           slots_(8 + 2 * k0_),
           next_(-k0_) {
-        x_rows_ = hwy::AllocateAligned<T>(std::size_t(width_) * std::size_t(tile.rows + 2 * j0_));
-        expanded_ = hwy::AllocateAligned<T>(kLag * std::size_t(width_ + 2 * kWord));
-        ring_ = hwy::AllocateAligned<T>(plane_size() * std::size_t(slots_));
-        zero_ = hwy::AllocateAligned<T>(group_size());
+        x_rows_ = aligned<T>(std::size_t(width_) * std::size_t(tile.rows + 2 * j0_));
+        expanded_ = aligned<T>(kLag * std::size_t(width_ + 2 * kWord));
+        ring_ = aligned<T>(plane_size() * std::size_t(slots_));
+        zero_ = aligned<T>(group_size());
         std::fill_n(zero_.get(), group_size(), T{0});
         full_.assign(std::size_t(slots_ * groups_), 0);
     }
@@ -240,7 +249,7 @@ template <class T, bool kUnit>
 void blocks_of_tile(const SmoothingPlan& plan, const SmoothingTile& tile, BlockSink& sink) {
     TilePass<T, kUnit> pass(plan, tile);
     const std::size_t width = std::size_t(pass.width());
-    const auto s = hwy::AllocateAligned<T>(8 * pass.group_size());
+    const auto s = aligned<T>(8 * pass.group_size());
     for (int z = 0; z < plan.extent.z; z += 8) {
         pass.advance(z + 8);
         for (int group = 0; group < pass.groups(); ++group) {

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <string>
 
 #include <mpi.h>
 
 #include "core/error.h"
+#include "simulation/memory.h"
 
 namespace nephos {
 namespace {
@@ -24,6 +26,16 @@ int rank_of_world() {
 int size_of_world() {
     int size = 1;
     MPI_Comm_size(MPI_COMM_WORLD, &size);
+    return size;
+}
+
+// Returns how many processes share the memory of this one's machine.
+int size_of_machine() {
+    MPI_Comm machine = MPI_COMM_NULL;
+    MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
+    int size = 1;
+    MPI_Comm_size(machine, &size);
+    MPI_Comm_free(&machine);
     return size;
 }
 
@@ -51,9 +63,14 @@ SlabAutomaton Ranks::make_slab(const AutomatonOptions& options) {
                     std::to_string(ranks) + " processes for " + std::to_string(options.extent.z) +
                         " levels: a process has at least " + std::to_string(kBlock) +
                         " of them, so at most " + std::to_string(blocks) + " processes can help");
-    const int rank = rank_of_world();
-    return SlabAutomaton(options, end_of(rank - 1, ranks, options.extent.z),
-                         end_of(rank, ranks, options.extent.z));
+    const int rank = rank_of_world(), machine = size_of_machine();
+    const int begin = end_of(rank - 1, ranks, options.extent.z), end = end_of(rank, ranks, options.extent.z);
+    const std::size_t bytes = SlabAutomaton::memory_bytes(options, end - begin);
+    constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+    require_memory(bytes > kAll / std::size_t(machine) ? kAll : bytes * std::size_t(machine),
+                   std::to_string(machine) + " processes of this machine with " +
+                       std::to_string(end - begin) + " levels each");
+    return SlabAutomaton(options, begin, end);
 }
 
 Ranks::Ranks(const AutomatonOptions& options)

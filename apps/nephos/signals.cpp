@@ -46,7 +46,7 @@ void install_signal_handlers() {
     action.sa_handler = on_stop;
     ::sigemptyset(&action.sa_mask);
     action.sa_flags = SA_RESTART;
-    for (const int signal : {SIGINT, SIGTERM}) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         struct sigaction old {};
         // A parent that ignores the signal (nohup, a background job of a shell) goes on ignoring it.
         if (::sigaction(signal, nullptr, &old) == 0 && old.sa_handler == SIG_IGN) continue;

@@ -171,6 +171,17 @@ namespace {
 
 constexpr int kDeepest = 64;  // lists and dicts in each other
 
+// Returns a text of Python as UTF-8. Throws Error(usage) on lone surrogates, as names of files have them.
+std::string utf8_of(const py::str& text) {
+    Py_ssize_t size = 0;
+    const char* bytes = PyUnicode_AsUTF8AndSize(text.ptr(), &size);
+    if (bytes != nullptr) return {bytes, std::size_t(size)};
+    PyErr_Clear();
+    throw Error(ErrorCode::usage,
+                py::repr(text).cast<std::string>() +
+                    ": is no text of Unicode, which the text of a scene or a plan has to be");
+}
+
 std::string toml_text(const py::handle& value, int depth) {
     if (depth > kDeepest)
         throw Error(ErrorCode::usage, "a value holds lists or dicts nested more than 64 deep, or itself");
@@ -182,11 +193,11 @@ std::string toml_text(const py::handle& value, int depth) {
         const bool whole = std::isfinite(number) && text.find_first_of(".e") == std::string::npos;
         return whole ? text + ".0" : text;
     }
-    if (py::isinstance<py::str>(value)) return quoted(value.cast<std::string>());
+    if (py::isinstance<py::str>(value)) return quoted(utf8_of(py::reinterpret_borrow<py::str>(value)));
     if (py::isinstance<py::dict>(value)) {
         std::string text;
         for (const auto& [key, entry] : py::reinterpret_borrow<py::dict>(value)) {
-            text += (text.empty() ? "" : ", ") + quoted(py::str(key).cast<std::string>()) + " = " +
+            text += (text.empty() ? "" : ", ") + quoted(utf8_of(py::str(key))) + " = " +
                     toml_text(entry, depth + 1);
         }
         return "{" + text + "}";

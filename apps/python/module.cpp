@@ -2,6 +2,9 @@
 
 // The compiled part of the Python package `nephos`: classes and their docstrings. Types stand in nephos/__init__.pyi.
 
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +19,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include "apps/python/arrays.h"
 #include "apps/python/live_simulation.h"
@@ -160,6 +164,10 @@ std::uint64_t whole_number(const py::object& value, std::string_view name, std::
     const auto number = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
     const unsigned long long taken = number ? PyLong_AsUnsignedLongLong(number.ptr()) : 0;
     if (PyErr_Occurred() == nullptr) return taken;
+    const bool is_wrong = PyErr_ExceptionMatches(PyExc_TypeError) ||
+                          PyErr_ExceptionMatches(PyExc_OverflowError) ||
+                          PyErr_ExceptionMatches(PyExc_ValueError);
+    if (!is_wrong) throw py::error_already_set();  // Ctrl-C and the like
     PyErr_Clear();
     throw Error(ErrorCode::usage,
                 fmt::format("{} is {}; expected {}", name, py::repr(value).cast<std::string>(), expected));
@@ -372,7 +380,16 @@ void set_threads(int count) {
 }  // namespace
 }  // namespace nephos
 
+// A process that was forked off has none of its parent's threads, and log4cplus, which OpenVDB brings along, waits for its own
+// when the process ends: by then all that Python has to do is done, and what the system does follows.
+void end_forked_process_at_once(int status, void* parent) {
+    if (::getpid() == pid_t(reinterpret_cast<std::intptr_t>(parent))) return;
+    std::fflush(nullptr);
+    ::_exit(status);
+}
+
 PYBIND11_MODULE(_nephos, module) {
+    ::on_exit(&end_forked_process_at_once, reinterpret_cast<void*>(std::intptr_t(::getpid())));
     nephos::add_error(module);
     nephos::add_scene(module);
     nephos::add_density(module);

@@ -11,6 +11,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 
 import numpy
@@ -41,8 +42,11 @@ def _error(text, code, file=None, line=None, column=None):
 
 def _call(arguments, allowed=(0,), plan=None):
     """Runs the command. `plan` is a file that its user did not write: messages call it the arguments."""
-    process = subprocess.Popen([_command(), *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                               text=True, errors="backslashreplace")
+    try:
+        process = subprocess.Popen([_command(), *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                                   text=True, errors="backslashreplace")
+    except OSError as error:
+        raise _error(f"{error.filename}: cannot be run: {error.strerror}", "io", error.filename) from None
     try:
         message = process.communicate()[1].strip()
     except BaseException as error:
@@ -77,10 +81,25 @@ def _column(name, values):
 
 
 def _table(path):
-    with open(path, newline="", encoding="utf-8") as file:
-        rows = csv.reader(file)
-        names = next(rows)
-        columns = list(zip(*rows)) or [()] * len(names)
+    """The columns of a table. Raises Error where the file is no whole table."""
+    most = csv.field_size_limit(sys.maxsize)  # a value of an axis may be a long one, such as a wind
+    try:
+        with open(path, newline="", encoding="utf-8") as file:
+            rows = csv.reader(file)
+            names = next(rows, None)
+            if not names:
+                raise _error(f"{path}: is empty; expected a table with names in its first line", "io", str(path))
+            lines = []
+            for row in rows:
+                if len(row) != len(names):
+                    raise _error(f"{path}:{rows.line_num}: has {len(row)} values; expected {len(names)}, as the first line has names",
+                                 "io", str(path), rows.line_num)
+                lines.append(row)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise _error(f"{path}: is damaged: {error}", "io", str(path)) from None
+    finally:
+        csv.field_size_limit(most)
+    columns = list(zip(*lines)) or [()] * len(names)
     return {name: _column(name, values) for name, values in zip(names, columns)}
 
 
@@ -118,7 +137,7 @@ class Sweep:
     def report(self, path=None):
         """Writes the sweep as one HTML page, and returns its path (report.html in the folder by default)."""
         path = pathlib.Path(path) if path is not None else self.folder / "report.html"
-        _call(["report", *self._records, "--out", path, "--quiet"])
+        _call(["report", *map(_path, self._records), "--out", _path(path), "--quiet"])
         return path
 
     @property
@@ -130,17 +149,31 @@ class Sweep:
         return f"<nephos.Sweep in {str(self.folder)!r}>"
 
 
-def _folder(path):
+def _path(path):
+    """A path as an argument of the command, which takes what begins with a dash for an option."""
     path = os.fsdecode(path)
-    if not path:
+    return os.path.join(".", path) if path.startswith("-") else path
+
+
+def _folder(path):
+    if not os.fsdecode(path):
         raise _error("the folder `out` has no name", "usage")
-    return path
+    return _path(path)
+
+
+def _pair(name, values, expected):
+    values = tuple(values)
+    if len(values) != 2:
+        raise _error(f"{name} is {values!r}; expected {expected}", "usage")
+    return values
 
 
 def _plan(axes, options):
     lines = [f"{key} = {_toml_text(value)}" for key, value in options.items() if value is not None]
     for key, values in axes.items():
         keys = [key] if isinstance(key, str) else list(key)
+        if isinstance(values, (str, bytes)):
+            raise _error(f"axes[{key!r}] is one text; expected a list of values", "usage")
         if not isinstance(values, dict):
             values = list(values)
             if not values:
@@ -178,11 +211,14 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
     out = _folder(out)
     options = {"scene": "scene.toml", "design": design, "points": points, "replicates": replicates, "seed": seed,
                "seeds": seeds, "clouds_every": clouds_every, "tracks": tracks or None, "layer": layer}
-    with contextlib.suppress(OSError):  # without a current folder only names of files need one
+    with contextlib.suppress(OSError, UnicodeEncodeError):  # without such a current folder only names of files need one
+        os.getcwd().encode()
         options["folder"] = os.getcwd()
-    rules = {"min": steps[0], "max": steps[1]}
+    least, most = _pair("steps", steps, "(least, most)")
+    rules = {"min": least, "max": most}
     if until is not None:
-        rules["until"] = {"statistic": until[0], "standard_error": until[1]}
+        statistic, error = _pair("until", until, "(statistic, standard error)")
+        rules["until"] = {"statistic": statistic, "standard_error": error}
     options["steps"] = rules
     with tempfile.TemporaryDirectory(prefix="nephos-") as folder:
         if isinstance(scene, Scene):
@@ -192,7 +228,7 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
         plan = pathlib.Path(folder, "sweep.toml")
         plan.write_text(_plan(axes, options), encoding="utf-8")
         jobs = [] if workers is None else ["--workers", workers]
-        part = [] if shard is None else ["--shard", f"{shard[0]}/{shard[1]}"]
+        part = [] if shard is None else ["--shard", "{}/{}".format(*_pair("shard", shard, "(i, n)"))]
         _call(["sweep", plan, "--out", out, "--quiet", *jobs, *part, *_flags(retry_failed, overwrite)], allowed=(0, 1), plan=plan)
     return Sweep(out) if shard is None else None
 
@@ -206,6 +242,9 @@ def merge(folders, out=None, *, overwrite=False):
     folder by default. Runs that are missing yet stand in runs.csv as missing. Raises Error where that would lose runs of earlier
     tables, unless `overwrite`."""
     folders = [folders] if isinstance(folders, (str, os.PathLike)) else list(folders)
+    if not folders:
+        raise _error("folders is empty; expected the folder of a sweep, or several", "usage")
+    folders = [_path(folder) for folder in folders]
     out = _folder(folders[0] if out is None else out)
     _call(["merge", *folders, "--out", out, "--quiet", *_flags(False, overwrite)])
     sweep = Sweep(out)
@@ -220,7 +259,7 @@ def fit(path, out, *, workers=None, retry_failed=False, overwrite=False):
     text of the command."""
     out = _folder(out)
     jobs = [] if workers is None else ["--workers", workers]
-    _call(["fit", path, "--out", out, "--quiet", *jobs, *_flags(retry_failed, overwrite)])
+    _call(["fit", _path(path), "--out", out, "--quiet", *jobs, *_flags(retry_failed, overwrite)])
     result = json.loads(pathlib.Path(out, "fit.json").read_text(encoding="utf-8"))
     result["posterior"] = _table(pathlib.Path(out, "posterior.csv"))
     return result
