@@ -83,7 +83,7 @@ void check_sizes(std::ifstream& in, std::uint64_t file_size) {
 std::vector<std::byte> read_all(const std::filesystem::path& path) {
     require_regular_file(path);
     const std::uint64_t size = std::filesystem::file_size(path);
-    std::ifstream in(path, std::ios::binary);
+    std::ifstream in = open_stream(path);
     try {
         check_sizes(in, size);
     } catch (const Error& error) {

@@ -21,11 +21,13 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags) {
         const int error = errno;
         if (error == ELOOP && (flags & O_NOFOLLOW) != 0)
             throw Error(ErrorCode::io, path.string() + ": is a link, which is not followed here");
-        throw Error(ErrorCode::io, path.string() + ": cannot open: " + std::strerror(error));
+        if (error == ENOENT || error == ENOTDIR || error == ELOOP || error == ENAMETOOLONG)
+            throw Error(ErrorCode::io, path.string() + ": cannot open: " + std::strerror(error));
+        throw ReadFailure(path, std::strerror(error), "open");
     }
     if (descriptor.get() >= 0 && ::fstat(descriptor.get(), &status) != 0) {
         const int error = errno;
-        throw Error(ErrorCode::io, path.string() + ": cannot examine: " + std::strerror(error));
+        throw ReadFailure(path, std::strerror(error), "examine");
     }
     if (S_ISDIR(status.st_mode)) throw Error(ErrorCode::io, path.string() + ": is a folder");
     // ENXIO: a pipe without a reader, or a socket.
@@ -34,6 +36,16 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags) {
 }
 
 void require_regular_file(const std::filesystem::path& path) { open_regular_file(path, O_RDONLY); }
+
+std::ifstream open_stream(const std::filesystem::path& path) {
+    require_regular_file(path);
+    errno = 0;
+    std::ifstream stream(path, std::ios::binary);
+    // A stream that is not open reads as an empty file.
+    if (!stream.is_open())
+        throw ReadFailure(path, errno != 0 ? std::strerror(errno) : "unknown error", "open");
+    return stream;
+}
 
 void check_reading(const std::istream& stream, const std::filesystem::path& path) {
     if (stream.bad()) throw ReadFailure(path, errno != 0 ? std::strerror(errno) : "unknown error");
@@ -52,6 +64,13 @@ std::string read_beginning(const std::filesystem::path& path, std::size_t most) 
     }
     text.resize(size);
     return text;
+}
+
+bool is_there(const std::filesystem::path& path) {
+    std::error_code error;
+    const std::filesystem::file_type type = std::filesystem::status(path, error).type();
+    if (type == std::filesystem::file_type::none) throw ReadFailure(path, error.message(), "examine");
+    return type != std::filesystem::file_type::not_found;
 }
 
 bool is_same_file(int fd, const std::filesystem::path& path) {

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <fstream>
 #include <iosfwd>
 #include <span>
 #include <string>
@@ -50,17 +51,22 @@ class Descriptor {
 };
 
 // Opens a regular file, following symbolic links; never blocks. `flags` as for open(2), O_CLOEXEC is added;
-// O_CREAT uses mode 0666 and the umask. Throws Error(io) that names the path and the reason.
+// O_CREAT uses mode 0666 and the umask. Throws Error(io) that names the path and the reason; ReadFailure where that is not that
+// there is no such file, or something else in its place.
 Descriptor open_regular_file(const std::filesystem::path& path, int flags);
 
 // Throws Error(io) unless open_regular_file() can read it.
 void require_regular_file(const std::filesystem::path& path);
 
+// Opens a regular file to read from it. Throws as open_regular_file().
+std::ifstream open_stream(const std::filesystem::path& path);
+
 // A file that is there and cannot be read, which says nothing of its content: "PATH: cannot read: Input/output error".
 class ReadFailure : public Error {
   public:
-    ReadFailure(const std::filesystem::path& path, const std::string& reason)
-        : Error(ErrorCode::io, path.string() + ": cannot read: " + reason) {}
+    // `act`: what failed, as "open".
+    ReadFailure(const std::filesystem::path& path, const std::string& reason, const std::string& act = "read")
+        : Error(ErrorCode::io, path.string() + ": cannot " + act + ": " + reason) {}
 };
 
 // Throws ReadFailure when reading from the stream of a file has just failed; its end is no failure.
@@ -68,6 +74,9 @@ void check_reading(const std::istream& stream, const std::filesystem::path& path
 
 // Returns at most `most` bytes from the beginning of a file. Throws as open_regular_file(), and ReadFailure.
 std::string read_beginning(const std::filesystem::path& path, std::size_t most);
+
+// Returns whether something is there, links followed. Throws ReadFailure where the system cannot say.
+bool is_there(const std::filesystem::path& path);
 
 // Returns true when `path`, links followed, leads to the file or folder that is open.
 bool is_same_file(int fd, const std::filesystem::path& path);

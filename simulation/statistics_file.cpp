@@ -73,8 +73,7 @@ std::string statistics_row(const StepResult& result, const LayerStep& layer) {
 std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
                               const StatisticsVisitor& visit, std::string_view header,
                               std::string_view cure) {
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
+    std::ifstream stream = open_stream(path);
     std::string line;
     // A last line without its newline is one that was being written.
     const auto next_line = [&] { return std::getline(stream, line) && !stream.eof(); };

@@ -14,6 +14,7 @@
 #include <tbb/parallel_for.h>
 
 #include "automaton/checkpoint.h"
+#include "core/descriptor.h"
 #include "core/digest.h"
 #include "core/error.h"
 #include "density/combine.h"
@@ -316,7 +317,10 @@ void check_content(const RunListing& run, const VerifyOptions& options, std::vec
             if (next > before) continue;
             try {
                 take(load_density(paths[next], reading));
+            } catch (const ReadFailure&) {
+                throw;  // which says nothing of its content
             } catch (const Error& alone) {
+                if (!std::string_view(alone.what()).starts_with(paths[next].string())) throw;  // nor this
                 decoder.unreadable(alone);
                 finish_file();
             }
@@ -385,8 +389,7 @@ class Replay : public SimulationSink {
 Simulation branch_anew(const RunListing& run, const Scene& scene) {
     const BranchPoint& point = *run.branch;
     const std::filesystem::path file = point.place.empty() ? point.checkpoint : point.place;
-    std::error_code error;
-    if (!std::filesystem::exists(file, error))
+    if (!is_there(file))
         throw Error(ErrorCode::io,
                     fmt::format("{}: the checkpoint that the run branched off is not there any more",
                                 point.checkpoint.string()));
@@ -486,8 +489,7 @@ std::vector<Check> check_files(const std::filesystem::path& folder, const std::v
     tbb::parallel_for(std::size_t(0), files.size(), [&](std::size_t n) {
         const std::filesystem::path path = folder / files[n].path;
         try {
-            std::error_code error;
-            if (!std::filesystem::exists(path, error)) {
+            if (!is_there(path)) {
                 missing[n] = files[n].path.generic_string() + " is missing";
                 return;
             }
@@ -498,6 +500,8 @@ std::vector<Check> check_files(const std::filesystem::path& folder, const std::v
             else if (found.xxh3 != files[n].xxh3)
                 wrong[n] = fmt::format("{}: its bytes are not those that were written",
                                        files[n].path.generic_string());
+        } catch (const ReadFailure&) {
+            throw;
         } catch (const Error& error) {
             wrong[n] = error.what();
         }

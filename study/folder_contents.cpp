@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "study/records.h"
 #include "study/sweep_plan.h"
 #include <fmt/format.h>
 
@@ -17,14 +18,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_there(const fs::path& path) {
+// Throws ReadFailure where the system cannot say.
+bool stands_there(const fs::path& path) {
     std::error_code error;
-    return fs::symlink_status(path, error).type() != fs::file_type::not_found;
+    const fs::file_type type = fs::symlink_status(path, error).type();
+    if (type == fs::file_type::none) throw ReadFailure(path, error.message(), "examine");
+    return type != fs::file_type::not_found;
 }
 
 bool begins_with(const fs::path& file, std::string_view text) {
     try {
         return read_beginning(file, text.size()) == text;
+    } catch (const ReadFailure&) {
+        throw;  // which says nothing of its content
     } catch (const Error&) {
         return false;  // whatever it is, no sweep wrote it
     }
@@ -44,12 +50,21 @@ constexpr std::pair<std::string_view, std::string_view> kTables[] = {
     {"tracks.csv", "run,point,replicate,"},
 };
 
+// Returns whether the plan and the scene in a folder of records are those of a version that marked nothing.
+bool is_unmarked(const fs::path& folder, std::string_view name) {
+    constexpr std::string_view kPlan = "scene = \"scene.toml\"\ndesign = \"";
+    return (name == "scene.toml" || name == "sweep.toml") && has_shards(folder) &&
+           begins_with(folder / "sweep.toml", kPlan);
+}
+
 // NetCDF of a sweep: its title stands behind its few dimensions.
 bool is_series_of_sweep(const fs::path& file) {
     constexpr std::size_t kHead = 4096;
     try {
         const std::string head = read_beginning(file, kHead);
         return head.starts_with("CDF") && head.find(kSweepTitle) != head.npos;
+    } catch (const ReadFailure&) {
+        throw;
     } catch (const Error&) {
         return false;
     }
@@ -58,7 +73,7 @@ bool is_series_of_sweep(const fs::path& file) {
 }  // namespace
 
 void require_absent(const fs::path& file, std::string_view by) {
-    if (!is_there(file)) return;
+    if (!stands_there(file)) return;
     throw Error(
         ErrorCode::usage,
         fmt::format("{}: is there, but {} did not write it, and would replace it: give another folder",
@@ -70,7 +85,8 @@ void require_own(const fs::path& file, std::string_view beginning, std::string_v
 }
 
 void require_sweep_folder(const fs::path& folder) {
-    for (const auto& [name, beginning] : kTables) require_own(folder / name, beginning, kSweep);
+    for (const auto& [name, beginning] : kTables)
+        if (!is_unmarked(folder, name)) require_own(folder / name, beginning, kSweep);
     if (!is_series_of_sweep(folder / "series.nc")) require_absent(folder / "series.nc", kSweep);
     // Leaves links and pipes to open_regular_file(), which refuses them with the reason; a killed sweep leaves it empty.
     const fs::path timing = folder / "timing.csv";

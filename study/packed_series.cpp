@@ -162,6 +162,12 @@ std::vector<float> unpack_scaled(std::span<const std::byte> bytes, std::size_t c
 
 }  // namespace
 
+bool begins_packed(std::string_view text) {
+    constexpr char kZlib = 0x78;
+    if (text.starts_with(kWithScales)) text.remove_prefix(1);
+    return text.starts_with(kZlib);
+}
+
 std::string pack_series(std::span<const float> values, std::span<const SeriesScale> scales) {
     if (scales.empty()) return deflated(planes_of(std::vector<Numbers>{bits_of(values)}));
     assert(scales.size() <= kMostSeries && values.size() % scales.size() == 0);

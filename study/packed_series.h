@@ -24,6 +24,9 @@ namespace nephos {
 // Deflate makes at most 1,032 bytes of one: no packed series holds more bytes than this times its own.
 inline constexpr std::uint64_t kMostUnpacked = 1032;
 
+// Returns whether a file may begin so that packed series begin.
+bool begins_packed(std::string_view text);
+
 // Packs series of one length, one after the other, as many as there are scales; without scales it is one. Preconditions: at
 // most 64 scales, values in a multiple of their number, and `by` of a scale -1 or the place of one before it. Equal
 // arguments give equal bytes with one version of zlib.

@@ -230,8 +230,7 @@ std::string failure_line(const PlannedRun& run, std::string_view message) {
 
 std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesystem::path& path,
                                                             RecordsFor use) {
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
+    std::ifstream stream = open_stream(path);
     const auto shard = std::uint32_t(files_.size());
     files_.push_back({std::filesystem::path(path).replace_extension(".series"), folders_ - 1});
     // Series are written before the records that name them: fewer are damage, and not to be filled with zeros.
@@ -352,8 +351,9 @@ void remove_shards(const std::filesystem::path& folder, std::uint32_t number, st
         require_own_records(path);
     }
     for (const std::filesystem::path& path : files) {
+        // Records last: series without them are nobody's.
         for (const std::filesystem::path& file :
-             {path, std::filesystem::path(path).replace_extension(".series")}) {
+             {std::filesystem::path(path).replace_extension(".series"), path}) {
             std::error_code error;
             std::filesystem::remove(file, error);
             if (error) throw Error(ErrorCode::io, file.string() + ": cannot remove: " + error.message());
@@ -400,7 +400,8 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
     std::error_code error;
     const bool is_file =
         std::filesystem::is_regular_file(std::filesystem::symlink_status(series_path_, error));
-    if (is_file && !std::filesystem::exists(path_, error)) require_absent(series_path_, "a sweep");
+    if (is_file && !std::filesystem::exists(path_, error) && !begins_packed(read_beginning(series_path_, 2)))
+        require_absent(series_path_, "a sweep");
     // What they are cut to is no file that somebody else has put a link to here.
     constexpr int kOwn = O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW;
     files_->records = open_regular_file(path_, kOwn);

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "scenes/format/writer.h"
 #include "simulation/checked_json.h"
@@ -87,7 +88,7 @@ std::uint64_t steps_before(const RunSettings& settings) {
 
 SeriesReport series_report(const std::filesystem::path& statistics, const Scene& scene, const StopAt& stop) {
     const Column column = column_of(scene, stop);
-    std::ifstream stream(statistics);
+    std::ifstream stream = open_stream(statistics);
     std::string line;
     std::getline(stream, line);
     const std::vector<std::string> header = fields_of(line);

@@ -171,6 +171,15 @@ bool is_plan_of(const SweepPlan& plan, const std::filesystem::path& folder) {
            has_content(folder / "sweep.toml", plan.to_toml_in(folder));
 }
 
+bool has_runs_of(const SweepPlan& plan, const std::filesystem::path& folder) {
+    if (is_plan_of(plan, folder)) return true;
+    const SweepPlan other = plan_of_folder(folder);
+    if (other.points() != plan.points() || other.runs() != plan.runs()) return false;
+    for (std::uint64_t n = 0; n < plan.runs(); ++n)
+        if (other.run(n).id != plan.run(n).id) return false;
+    return true;
+}
+
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job) {
     return status_of(plan, job, Records::read({job.folder}));
 }

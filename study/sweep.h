@@ -65,6 +65,9 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
 // Returns whether the folder has this plan.
 bool is_plan_of(const SweepPlan& plan, const std::filesystem::path& folder);
 
+// Returns whether the plan in the folder, with whatever words, asks for the same runs as this one.
+bool has_runs_of(const SweepPlan& plan, const std::filesystem::path& folder);
+
 // Reads the plan of a folder from its sweep file. Throws SceneErrors and Error(io), also when it has none.
 SweepPlan plan_of_folder(const std::filesystem::path& folder);
 

@@ -70,7 +70,8 @@ std::string canonical_value(const std::string& value) {
     const auto [last, error] = std::from_chars(begin, end, number);
     if (error == std::errc() && last == end) return number_text(number == 0 ? 0.0 : number);  // one zero only
     // 0x10 and 1_000 are numbers of TOML, too.
-    const std::optional<std::string> other = canonical_toml(value);
+    const bool may_be = value.find_first_not_of("0123456789abcdefABCDEFxob_.+-") == value.npos;
+    const std::optional<std::string> other = may_be ? canonical_toml(value) : std::nullopt;
     if (other && *other != value) return canonical_value(*other);
     return toml_string(value);
 }

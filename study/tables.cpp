@@ -466,9 +466,8 @@ PointSummary summarise(const SweepPlan& plan, const Records& records, std::uint6
 LostRuns runs_lost(const SweepPlan& plan, const Records& records, const std::filesystem::path& folder) {
     const std::filesystem::path path = folder / "runs.csv";
     LostRuns lost;
-    if (!std::filesystem::exists(path)) return lost;
-    require_regular_file(path);
-    std::ifstream table(path);
+    if (std::filesystem::symlink_status(path).type() == std::filesystem::file_type::not_found) return lost;
+    std::ifstream table = open_stream(path);
     std::set<std::string, std::less<>> ids;  // of runs that are in a record
     for (std::string line; std::getline(table, line);) {
         // The last column, state_hash, has a value where the run is done.

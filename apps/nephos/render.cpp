@@ -184,6 +184,12 @@ int render(const RenderArguments& a) {
     std::optional<Scene> scene;
     if (!a.scene.file.empty()) scene = load_scene(a.scene);
     const LoadedDensity loaded = load_density(a.file, a.read);
+    constexpr double kLargestCell_m = 1e9;  // as of --scale; rays take a time that grows with it
+    if (const double cell_m = loaded.density.placement().cell_size_m; cell_m > kLargestCell_m)
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: its voxels have an edge of {:g} m: expected at most {:g} m, as with "
+                                "a smaller --scale",
+                                a.file, cell_m, kLargestCell_m));
     if (!a.work.quiet) {
         for (const std::string& note : loaded.notes) print_note(a.file + ": " + note);
     }

@@ -261,6 +261,13 @@ int sweep(const SweepArguments& a) {
             throw Error(ErrorCode::io,
                         folder + ": another plan took the place of this one: no tables are written");
         const Records records = report.records ? std::move(*report.records) : Records::read({job.folder});
+        const bool is_new = std::ranges::any_of(records.problems(), [&](const std::string& problem) {
+            return std::ranges::count(report.problems, problem) == 0;
+        });
+        if (is_new) {  // what could be read before the runs cannot be read now
+            print_problems(records.problems());
+            throw Error(ErrorCode::io, folder + ": not all records can be read: no tables are written");
+        }
         write_and_print_tables(plan, records, folder, folder, quiet);
     } else if (!quiet) {
         output.line(fmt::format("shard {} of {} is done; when all are, `nephos merge {}` makes the tables",
@@ -297,7 +304,7 @@ int merge(const MergeArguments& a) {
                     fmt::format("{}/runs.csv has {} runs that {}/sweep.toml does not ask for: the tables of "
                                 "another plan stay as they are; --overwrite replaces them",
                                 out, lost.of_another_plan, a.folders.front()));
-    if (!a.overwrite && has_shards(out) && !is_plan_of(plan, out))
+    if (!a.overwrite && has_shards(out) && !has_runs_of(plan, out))
         throw Error(ErrorCode::usage, out + ": holds the records of a sweep of another plan than " +
                                           a.folders.front() +
                                           ": expected another --out for these tables, or --overwrite");

@@ -92,8 +92,7 @@ void put_pair(ByteWriter& w, std::string_view key, std::string_view value) {
 }  // namespace
 
 std::vector<std::byte> whole_file(const std::filesystem::path& path) {
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
+    std::ifstream stream = open_stream(path);
     std::vector<std::byte> bytes(std::filesystem::file_size(path));
     stream.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()));
     check_reading(stream, path);

@@ -267,17 +267,23 @@ class Child {
     std::string parser_;
 };
 
+// How a message begins that is of the system, and says nothing of what is in the file.
+constexpr std::string_view kCannotRead = "cannot read: ";
+
 void attempt(std::string_view parser, const SandboxLimits& limits, std::span<const int> kept, Clock::time_point deadline,
              bool last_attempt, const std::function<void(SandboxWriter&)>& child,
              const std::function<void(SandboxReader&)>& parent) {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) {
-        throw std::runtime_error(std::string("no pipe to a reading process: ") + std::strerror(errno));
+        throw std::runtime_error(std::string(kCannotRead) +
+                                 "no pipe to a reading process: " + std::strerror(errno));
     }
     Descriptor out(ends[0]), in(ends[1]);
     ::fcntl(ends[1], F_SETPIPE_SZ, 1 << 20);  // fewer turns of both; without the right to it the pipe is small
     const pid_t self = ::getpid(), pid = ::fork();
-    if (pid < 0) throw std::runtime_error(std::string("no process to read it in: ") + std::strerror(errno));
+    if (pid < 0)
+        throw std::runtime_error(std::string(kCannotRead) +
+                                 "no process to read it in: " + std::strerror(errno));
     if (pid == 0) run_child(self, ends[1], limits, kept, child);
     in.close();
     Child process(pid, parser);
@@ -373,7 +379,10 @@ void run_sandboxed(const std::filesystem::path& subject, std::string_view parser
         } catch (const Error&) {
             throw;
         } catch (const std::exception& error) {
-            throw Error(ErrorCode::io, subject.string() + ": " + clamp_message(error.what()));
+            const std::string message = clamp_message(error.what());
+            if (message.starts_with(kCannotRead))
+                throw ReadFailure(subject, message.substr(kCannotRead.size()));
+            throw Error(ErrorCode::io, subject.string() + ": " + message);
         }
     }
 }

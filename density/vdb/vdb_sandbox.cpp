@@ -33,11 +33,12 @@ namespace {
 Descriptor opened(const std::filesystem::path& path) {
     std::error_code error;
     const auto status = std::filesystem::status(path, error);
+    if (status.type() == std::filesystem::file_type::none)
+        throw ReadFailure(path, error.message(), "examine");
     if (!std::filesystem::exists(status)) fail(path, error ? error.message() : "there is no such file");
     if (std::filesystem::is_directory(status)) fail(path, "it is a folder, not a file");
     if (!std::filesystem::is_regular_file(status)) fail(path, "it is not a regular file");
-    std::ifstream stream(path, std::ios::binary);
-    if (!stream) fail(path, std::string("cannot be opened: ") + std::strerror(errno));
+    std::ifstream stream = open_stream(path);
     std::array<char, 8> magic{};
     stream.read(magic.data(), magic.size());
     check_reading(stream, path);

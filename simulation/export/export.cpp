@@ -257,6 +257,11 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
             return true;
         });
         if (most > 0) s.scale = most;
+        if (s.scale < kLeastScale || s.scale > kLargestScale)
+            throw Error(
+                ErrorCode::usage,
+                fmt::format("{}: its largest value is {:g}, and --range auto takes values from {:g} to {:g}",
+                            s.frames.front().file.string(), s.scale, kLeastScale, kLargestScale));
     }
     const FolderLock lock(options.folder, "export");
     ExportList list(options, sequences);

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "simulation/checked_json.h"
 #include "simulation/manifest.h"
@@ -134,7 +135,11 @@ void claim(const std::filesystem::path& folder) {
 
 bool is_export_folder(const std::filesystem::path& folder) {
     std::error_code error;
-    return std::filesystem::is_regular_file(folder / "export.json", error);
+    const std::filesystem::path list = folder / "export.json";
+    const std::filesystem::file_status status = std::filesystem::status(list, error);
+    if (status.type() == std::filesystem::file_type::none)
+        throw ReadFailure(list, error.message(), "examine");
+    return std::filesystem::is_regular_file(status);
 }
 
 ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences)
@@ -258,7 +263,7 @@ ListedExport read_export(const std::filesystem::path& folder) {
     for (const CheckedJson& s : root.at("sequences").items())
         list.sequences.push_back({s.at("name").text(), layout_of(s.at("layout")),
                                   int(s.at("levels").integer(1, kMostLevels)),
-                                  float(s.at("scale").real(1e-30, 1e30))});
+                                  float(s.at("scale").real(kLeastScale, kLargestScale))});
     const CheckedJson options = root.at("options");
     for (const auto& [name, type] : options.at("types").members())
         list.types[name] = VoxelType(type.integer(0, int(VoxelType::bc4)));

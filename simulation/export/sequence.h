@@ -34,6 +34,9 @@ struct WindTable {
     std::vector<WindLevel> levels;
 };
 
+// What --range auto divides values by.
+inline constexpr double kLeastScale = 1e-30, kLargestScale = 1e30;
+
 struct ExportSequence {
     std::string name;   // of its files
     std::string layer;  // empty: all together

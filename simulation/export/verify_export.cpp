@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "density/export/bricks.h"
 #include "density/export/cloud_picture.h"
@@ -144,14 +145,15 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
         if (file.source.empty()) continue;
         ++of_sources;
         const ListedExport::Sequence* s = sequence_of(list, file.path.generic_string());
-        std::error_code error;
-        if (s == nullptr || !std::filesystem::exists(folder / file.source, error)) {
+        if (s == nullptr || !is_there(folder / file.source)) {
             ++lost;
             continue;
         }
         try {
             if (file.source_digest && !(file_digest(folder / file.source) == *file.source_digest)) ++changed;
             if (compare_file(folder, list, *s, file, formats[file.format])) ++counts[file.format];
+        } catch (const ReadFailure&) {
+            throw;
         } catch (const Error& failure) {
             if (bad++ == 0) problem = failure.what();
         }

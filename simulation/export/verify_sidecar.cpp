@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "simulation/checked_json.h"
 #include "simulation/export/export_list.h"
@@ -60,8 +61,7 @@ std::optional<LoadedDensity> source_of(const std::filesystem::path& folder, cons
     for (const ExportedFile& file : list.files) {
         if (file.source.empty() || sequence_of(list, file.path.generic_string()) != &s) continue;
         const std::filesystem::path path = folder / file.source;
-        std::error_code error;
-        if (!std::filesystem::exists(path, error)) return {};
+        if (!is_there(path)) return {};
         if (file.source_digest && !(file_digest(path) == *file.source_digest)) return {};
         VdbReadOptions reading;
         reading.grid = list.grid;
@@ -105,7 +105,7 @@ void check_sidecar(const std::filesystem::path& path, const ListedExport& list,
     require_text(json.at("format"), "nephos volume");
     json.at("format_version").integer(1, 1);
     require_text(json.at("name"), s.name);
-    if (float(json.at("scale").real(1e-30, 1e30)) != s.scale)
+    if (float(json.at("scale").real(kLeastScale, kLargestScale)) != s.scale)
         json.at("scale").fail(fmt::format("{}, as in export.json", s.scale));
     std::vector<std::string> extensions;
     for (const CheckedJson& one : json.at("formats").items()) {
@@ -151,6 +151,8 @@ std::optional<Check> check_sidecars(const std::filesystem::path& folder, const L
             const std::optional<LoadedDensity> source = source_of(folder, list, s);
             compared += source.has_value();
             check_sidecar(folder / name, list, s, listed, source);
+        } catch (const ReadFailure&) {
+            throw;
         } catch (const Error& error) {
             if (bad++ == 0) problem = error.what();
         }

@@ -300,6 +300,24 @@ class Sweep(Injection):
     calls = ("write", "fsync", "rename", "open", "mkdir", "read")
 
 
+class GrownSweep(Injection):
+    """Goes on with a sweep of fewer values: what cannot be read is not taken for empty."""
+    arguments = ("sweep", "null.toml", "--axis", "field.background.ext=0.05,0.1,0.2", "--replicates", "2", "--steps", "40..80",
+                 "--out", "out", "-j", "1")
+    leftovers_stay = True
+    grows = (".jsonl", ".series", "timing.csv")
+    calls = ("write", "open", "read", "stat")
+
+    @classmethod
+    def prepare(cls):
+        subprocess.run([NEPHOS, "sweep", "null.toml", "--axis", "field.background.ext=0.05,0.1", "--replicates", "2", "--steps", "40..80",
+                        "--out", "before", "-j", "1", "--quiet"], cwd=cls.folder, check=True)
+        shutil.copytree(cls.folder / "before", cls.folder / "out")
+
+    def restore(self):
+        shutil.copytree(self.folder / "before", self.folder / "out")
+
+
 class Fit(Injection):
     arguments = ("fit", "fit.toml", "--out", "out", "-j", "1")
     leftovers_stay = True

@@ -489,7 +489,7 @@ class Signals(Case):
         return output, errors
 
     def test_the_first_signal_leaves_a_checkpoint(self):
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             shutil.rmtree(self.folder / "stopped", ignore_errors=True)
             output, errors = self.interrupt(number, self.long, "--no-render", "--out", "stopped")
             self.assertEqual(output, "")

@@ -653,6 +653,20 @@ sd = 0.05
         shutil.rmtree(self.folder / "begun/shards")
         (self.folder / "begun/timing.csv").write_text("")
         self.call("sweep", self.null, *axis, "begun")
+        before = self.tables("begun")
+        (self.folder / "begun/shards/0000-of-0001.jsonl").unlink()  # as a kill between the two does, and a user after damage
+        self.call("sweep", self.null, *axis, "begun")
+        self.assertEqual(self.tables("begun"), before)
+        # A version before wrote no marks.
+        for name in ("scene.toml", "sweep.toml"):
+            path = self.folder / "begun" / name
+            path.write_text(path.read_text().replace("# Written by nephos sweep.\n", ""))
+        self.call("sweep", self.null, *axis, "begun")
+        self.assertEqual(self.tables("begun"), before)
+        # One plan in two texts.
+        text = (self.folder / "begun/sweep.toml").read_text()
+        (self.folder / "begun/sweep.toml").write_text(text + "# a comment\n")
+        self.call("merge", "swept", "--out", "begun")
         self.call("merge", "swept", "--out", "tables")
         for folder in ("swept", "tables"):
             self.call("sweep", self.null, *axis, folder)
@@ -1067,6 +1081,11 @@ sd = 0.05
         steps = ("--replicates", "1", "--steps", "20", "--out")
         self.call("sweep", self.null, "--axis", "time.step_s=0x10,1_0", *steps, "a")
         self.assertEqual([run["time.step_s"] for run in rows(self.folder / "a/runs.csv")], ["16", "10"])
+        for name, steps_before in (("0#1.vdb", "1"), ("1_0.vdb", "2")):  # which are no numbers
+            self.call("state", self.null, "--steps", steps_before, "--out", name)
+        started = self.write("started.toml", NULL.replace('initial = "empty"', 'initial_state = "0#1.vdb"'))
+        self.call("sweep", started, "--axis", "lattice.initial_state=0#1.vdb,1_0.vdb", *steps, "c")
+        self.assertEqual([pathlib.Path(run["lattice.initial_state"]).name for run in rows(self.folder / "c/runs.csv")], ["0#1.vdb", "1_0.vdb"])
         large = ("9007199254740993", "9007199254740992", "-9007199254740993")
         said = self.call("sweep", self.null, "--axis", "lattice.cells[0]=" + ",".join(large), *steps, "b", status=2).stderr
         self.assertIn(f"--set lattice.cells[0]={large[0]}: error", said)

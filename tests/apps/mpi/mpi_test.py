@@ -58,6 +58,13 @@ class Mpi(Case):
         for option, number in (("--seed", 2**64), ("--seed", "0x10"), ("--steps", 10**20), ("--steps", 10**9 + 1), ("--steps", "1.5")):
             self.assertIn(f"'{number}' is not a whole number", self.mpirun(1, scene, option, number, "--hash", status=2).stderr)
 
+    def test_what_does_not_fit_into_memory_is_refused(self):
+        scene = self.write("s.toml", SCENE.format(boundaries='"periodic"', wind=""))
+        for processes in (1, 2):
+            said = self.mpirun(processes, scene, "--steps", "1", "--set", "lattice.cells=[65536, 65536, 65536]", status=2).stderr
+            self.assertIn(f"{processes} processes of this machine with {65536 // processes} levels each", said)
+            self.assertIn("are all there is", said)
+
     def test_hashes_that_cannot_be_printed(self):
         scene = self.write("s.toml", SCENE.format(boundaries='"periodic"', wind=""))
         with open("/dev/full", "w") as full:

@@ -294,6 +294,43 @@ class Studies(Case):
             nephos.merge(sweep.folder)
         self.assertEqual(set(nephos.merge(sweep.folder, overwrite=True).runs()["status"]), {"missing"})
 
+    def test_tables_are_read_as_a_whole_or_not_at_all(self):
+        long = [{"levels": [{"height_m": 10 * n, "from_deg": 0, "speed_m_per_s": 5} for n in range(900)]} for _ in range(5)]
+        for n, table in enumerate(long):
+            table["time_s"] = 100 * n
+        scene = nephos.Scene.from_text(NULL_SCENE)
+        sweep = nephos.sweep(scene, {"wind": [long, []]}, self.folder / "long", replicates=1, steps=(20, 20))
+        self.assertGreater(len(sweep.runs()["wind"][0]), 131_072)
+        path = sweep.folder / "runs.csv"
+        text = path.read_text()
+        lines = text.splitlines(keepends=True)
+        for damaged, says in ((text + "\n", "has 0 values"), (lines[0] + "a,b\n", "has 2 values"), ("", "is empty")):
+            path.write_text(damaged)
+            with self.assertRaisesRegex(nephos.Error, says) as caught:
+                sweep.runs()
+            self.assertEqual(caught.exception.code, "io")
+        path.write_bytes(b"\xff" + text.encode())
+        with self.assertRaisesRegex(nephos.Error, "is damaged"):
+            sweep.runs()
+
+    def test_a_folder_whose_name_begins_with_a_dash(self):
+        scene = nephos.Scene.from_text(NULL_SCENE)
+        before = os.getcwd()
+        os.chdir(self.folder)
+        try:
+            sweep = nephos.sweep(scene, {"field.background.ext": [0.1]}, "-x", replicates=1, steps=(20, 20))
+            self.assertTrue(sweep.report().is_file())
+            self.assertEqual(len(nephos.merge("-x").runs()["run"]), 1)
+            with self.assertRaisesRegex(nephos.Error, "is no folder of a sweep"):
+                nephos.merge("--help")
+            name = os.fsdecode(b"cw\xff")  # a current folder that no plan can name
+            os.mkdir(name)
+            os.chdir(name)
+            sweep = nephos.sweep(scene, {"field.background.ext": [0.1]}, self.folder / "there", replicates=1, steps=(20, 20))
+            self.assertEqual(len(sweep.runs()["run"]), 1)
+        finally:
+            os.chdir(before)
+
     def test_tracks_have_the_numbers_of_the_command(self):
         scene = nephos.Scene.from_text(NULL_SCENE)
         axes = {"field.background.ext": [0.05, 0.1]}
@@ -376,6 +413,14 @@ sd = 0.01
                 nephos.sweep(scene, axes, out=self.folder / "bad", **options)
             self.assertNotIn(tempfile.gettempdir() + "/nephos-", str(caught.exception))
             self.assertIsNone(caught.exception.file)
+        for axes, options, says in (({"field.background.ext": "0.1"}, {}, "is one text; expected a list of values"),
+                                    ({"field.background.ext": [0.1]}, {"steps": (20,)}, r"steps is \(20,\); expected \(least, most\)"),
+                                    ({"field.background.ext": [0.1]}, {"shard": (0,)}, r"shard is \(0,\); expected \(i, n\)"),
+                                    ({"field.background.ext": ["\udc80"]}, {}, "is no text of Unicode")):
+            with self.assertRaisesRegex(nephos.Error, says):
+                nephos.sweep(scene, axes, out=self.folder / "bad", **options)
+        with self.assertRaisesRegex(nephos.Error, "folders is empty"):
+            nephos.merge([])
         self.assertFalse((self.folder / "bad").exists())
         with self.assertRaisesRegex(nephos.Error, "runs.csv"):
             nephos.Sweep(self.folder)
@@ -493,6 +538,17 @@ class Threads(Case):
         self.assertNotEqual(*texts)
         with self.assertRaisesRegex(nephos.Error, "has no name"):
             nephos.sweep(scene, {}, "")
+
+    def test_a_forked_child_ends(self):
+        """It has none of the threads that libraries began in its parent."""
+        program = ("import os, sys, nephos\n"
+                   "print('parent', end=' ', flush=True)\n"
+                   "if os.fork() == 0:\n"
+                   "    print('child', end=' ')\n"
+                   "    sys.exit(7)\n"
+                   "print(os.waitstatus_to_exitcode(os.wait()[1]))\n")
+        result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+        self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "parent child 7\n", ""))
 
     def test_a_program_ends_while_its_daemons_work(self):
         # Python takes the interpreter from them where they come back from the engine.
