@@ -76,8 +76,11 @@ bool is_there(const std::filesystem::path& path) {
 bool is_same_file(int fd, const std::filesystem::path& path) {
     struct stat opened {
     }, found{};
-    return ::fstat(fd, &opened) == 0 && ::stat(path.c_str(), &found) == 0 && opened.st_dev == found.st_dev &&
-           opened.st_ino == found.st_ino;
+    if (::fstat(fd, &opened) != 0) throw ReadFailure(path, std::strerror(errno), "examine");
+    if (::stat(path.c_str(), &found) == 0)
+        return opened.st_dev == found.st_dev && opened.st_ino == found.st_ino;
+    if (errno == ENOENT || errno == ENOTDIR || errno == ELOOP) return false;
+    throw ReadFailure(path, std::strerror(errno), "examine");
 }
 
 bool is_named_pipe(const std::filesystem::path& path) {

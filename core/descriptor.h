@@ -78,7 +78,8 @@ std::string read_beginning(const std::filesystem::path& path, std::size_t most);
 // Returns whether something is there, links followed. Throws ReadFailure where the system cannot say.
 bool is_there(const std::filesystem::path& path);
 
-// Returns true when `path`, links followed, leads to the file or folder that is open.
+// Returns true when `path`, links followed, leads to the file or folder that is open. Throws ReadFailure where the system
+// cannot say.
 bool is_same_file(int fd, const std::filesystem::path& path);
 
 // Returns true for a FIFO with a name in the file system, which blocks its reader until somebody opens it to

@@ -173,7 +173,7 @@ std::vector<std::filesystem::path> files_of_shards(const std::filesystem::path& 
     if (error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory) return files;
     for (; !error && at != end; at.increment(error))
         if (is_name_of_shard(at->path())) files.push_back(at->path());
-    if (error) throw Error(ErrorCode::io, (folder / "shards").string() + ": cannot read: " + error.message());
+    if (error) throw ReadFailure(folder / "shards", error.message());
     std::ranges::sort(files);
     return files;
 }
@@ -294,11 +294,16 @@ Records Records::read(const std::vector<std::filesystem::path>& folders, Records
         try {
             files = files_of_shards(folder);
         } catch (const Error& problem) {
+            if (use == RecordsFor::running) throw;
             records.problems_.emplace_back(problem.what());
         }
         for (const std::filesystem::path& file : files) {
             try {
                 records.read_shard(file, use);
+            } catch (const ReadFailure& problem) {
+                // All runs of it would be done once more, though nothing is wrong with it.
+                if (use == RecordsFor::running) throw;
+                records.problems_.emplace_back(problem.what());
             } catch (const Error& problem) {
                 if (problem.code() != ErrorCode::io) throw;
                 records.problems_.emplace_back(problem.what());

@@ -85,7 +85,13 @@ std::string scene_of(std::string_view file, const fs::path& name) {
 
 }  // namespace
 
-bool AutosaveFile::is_in_place() const { return is_open() && is_same_file(file_.get(), path_); }
+bool AutosaveFile::is_in_place() const {
+    try {
+        return is_open() && is_same_file(file_.get(), path_);
+    } catch (const Error&) {
+        return false;  // another one is begun
+    }
+}
 
 void AutosaveFile::claim(const fs::path& folder, const std::string& name) {
     constexpr int kAttempts = 1000;
