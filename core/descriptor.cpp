@@ -13,6 +13,15 @@
 
 namespace nephos {
 
+namespace {
+
+// Returns whether an error of the system says that there is no such file, and not that it cannot tell.
+bool is_absence(int error) {
+    return error == ENOENT || error == ENOTDIR || error == ELOOP || error == ENAMETOOLONG;
+}
+
+}  // namespace
+
 Descriptor open_regular_file(const std::filesystem::path& path, int flags) {
     // O_NONBLOCK has no effect on regular files, and does not wait for the other end of a pipe.
     Descriptor descriptor(::open(path.c_str(), flags | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0666));
@@ -21,7 +30,7 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags) {
         const int error = errno;
         if (error == ELOOP && (flags & O_NOFOLLOW) != 0)
             throw Error(ErrorCode::io, path.string() + ": is a link, which is not followed here");
-        if (error == ENOENT || error == ENOTDIR || error == ELOOP || error == ENAMETOOLONG)
+        if (is_absence(error))
             throw Error(ErrorCode::io, path.string() + ": cannot open: " + std::strerror(error));
         throw ReadFailure(path, std::strerror(error), "open");
     }
@@ -69,8 +78,9 @@ std::string read_beginning(const std::filesystem::path& path, std::size_t most) 
 bool is_there(const std::filesystem::path& path) {
     std::error_code error;
     const std::filesystem::file_type type = std::filesystem::status(path, error).type();
-    if (type == std::filesystem::file_type::none) throw ReadFailure(path, error.message(), "examine");
-    return type != std::filesystem::file_type::not_found;
+    if (type != std::filesystem::file_type::none) return type != std::filesystem::file_type::not_found;
+    if (is_absence(error.value())) return false;
+    throw ReadFailure(path, error.message(), "examine");
 }
 
 bool is_same_file(int fd, const std::filesystem::path& path) {
@@ -79,7 +89,7 @@ bool is_same_file(int fd, const std::filesystem::path& path) {
     if (::fstat(fd, &opened) != 0) throw ReadFailure(path, std::strerror(errno), "examine");
     if (::stat(path.c_str(), &found) == 0)
         return opened.st_dev == found.st_dev && opened.st_ino == found.st_ino;
-    if (errno == ENOENT || errno == ENOTDIR || errno == ELOOP) return false;
+    if (is_absence(errno)) return false;
     throw ReadFailure(path, std::strerror(errno), "examine");
 }
 

@@ -10,6 +10,7 @@
 
 #include "automaton/checkpoint.h"
 #include "core/atomic_file.h"
+#include "core/descriptor.h"
 #include "core/digest.h"
 #include "core/error.h"
 #include "simulation/earlier_run.h"
@@ -25,13 +26,13 @@ std::filesystem::path checkpoint_of(const std::filesystem::path& from) {
         throw Error(ErrorCode::io, from.string() + ": " + what + ": expected the folder of a run, or its checkpoint");
     };
     std::error_code error;
-    if (!std::filesystem::exists(from, error)) refuse("no such run");
+    if (!is_there(from)) refuse("no such run");
     if (!std::filesystem::is_directory(from, error)) {
         if (!is_checkpoint(from)) refuse("is no checkpoint of a run");
         return from;
     }
     const std::filesystem::path checkpoint = from / "checkpoint.nephos";
-    if (!std::filesystem::exists(checkpoint, error)) refuse("holds no checkpoint of a run");
+    if (!is_there(checkpoint)) refuse("holds no checkpoint of a run");
     return checkpoint;
 }
 

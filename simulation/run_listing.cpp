@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "scenes/format/reader.h"
 #include "simulation/checked_json.h"
@@ -31,7 +32,8 @@ ListedFrame frame_of(const Json& json, const std::filesystem::path& manifest) {
 
 bool is_run_folder(const std::filesystem::path& folder) {
     std::error_code error;
-    return std::filesystem::is_regular_file(folder / "manifest.json", error);
+    const std::filesystem::path manifest = folder / "manifest.json";
+    return is_there(manifest) && std::filesystem::is_regular_file(manifest, error);
 }
 
 RunListing read_run(const std::filesystem::path& folder) {

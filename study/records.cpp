@@ -237,6 +237,7 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
     const std::filesystem::path& series_path = files_.back().path;
     std::error_code error;
     const std::uintmax_t size = std::filesystem::file_size(series_path, error);
+    if (error && is_there(series_path)) throw ReadFailure(series_path, error.message(), "examine");
     const std::uint64_t stored = error ? 0 : size;
     std::uint64_t at = 0, bytes = 0, series = 0;
     std::string problem;
@@ -405,7 +406,9 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
     std::error_code error;
     const bool is_file =
         std::filesystem::is_regular_file(std::filesystem::symlink_status(series_path_, error));
-    if (is_file && !std::filesystem::exists(path_, error) && !begins_packed(read_beginning(series_path_, 2)))
+    if (is_file && !std::filesystem::exists(path_, error) &&
+        !begins_packed(read_beginning(series_path_, 2)) &&
+        std::filesystem::file_size(series_path_, error) > 0)
         require_absent(series_path_, "a sweep");
     // What they are cut to is no file that somebody else has put a link to here.
     constexpr int kOwn = O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW;

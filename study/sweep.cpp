@@ -101,8 +101,7 @@ RunResult unpacked(const std::string& text) {
 }
 
 bool has_content(const std::filesystem::path& path, const std::string& content) {
-    std::error_code error;
-    if (!std::filesystem::exists(path, error)) return false;
+    if (!is_there(path)) return false;
     return read_beginning(path, content.size() + 1) == content;
 }
 
@@ -116,8 +115,7 @@ Error changed_since(const std::filesystem::path& file) {
 // A folder whose plan is another one may get this one as soon as nobody makes runs of that; none has plans side by side.
 // Throws Error(io) before anything is changed.
 void require_place_for(const SweepPlan& plan, const FolderGuard& guard, const std::filesystem::path& folder) {
-    std::error_code error;
-    const bool is_new = !std::filesystem::exists(folder / "sweep.toml", error);
+    const bool is_new = !is_there(folder / "sweep.toml");
     if (!is_new && !is_plan_of(plan, folder)) guard.require_no_writer();
 }
 
@@ -172,7 +170,8 @@ bool is_plan_of(const SweepPlan& plan, const std::filesystem::path& folder) {
 }
 
 bool has_runs_of(const SweepPlan& plan, const std::filesystem::path& folder) {
-    if (is_plan_of(plan, folder)) return true;
+    // Shards that were copied together have no plan yet.
+    if (!is_there(folder / "sweep.toml") || is_plan_of(plan, folder)) return true;
     const SweepPlan other = plan_of_folder(folder);
     if (other.points() != plan.points() || other.runs() != plan.runs()) return false;
     for (std::uint64_t n = 0; n < plan.runs(); ++n)
@@ -270,8 +269,7 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
 
 SweepPlan plan_of_folder(const std::filesystem::path& folder) {
     const std::filesystem::path file = folder / "sweep.toml";
-    std::error_code error;
-    if (!std::filesystem::exists(file, error))
+    if (!is_there(file))
         throw Error(ErrorCode::io,
                     folder.string() + ": is no folder of a sweep: it has no sweep.toml (expected the --out of "
                                       "`nephos sweep`)");
@@ -306,7 +304,7 @@ std::uint64_t unused_records(const SweepPlan& plan, const Records& records) {
 }
 
 void write_plan_of_tables(const SweepPlan& plan, const std::filesystem::path& folder) {
-    if (!has_shards(folder)) place_plan(plan, folder);
+    if (!has_shards(folder) || !is_there(folder / "sweep.toml")) place_plan(plan, folder);
 }
 
 }  // namespace nephos

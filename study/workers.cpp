@@ -52,13 +52,14 @@ struct Worker {
     std::optional<std::uint64_t> task;
 };
 
+// Ctrl-C and the end of a terminal go to the whole group, and the SIGTERM of a batch system to every process of a job, in any
+// order. The parent decides what is kept: a worker that ended before it had heard would count as a failed run.
+constexpr int kEndings[] = {SIGINT, SIGTERM, SIGHUP};
+
 // The life of a worker; it ends when its parent does.
 [[noreturn]] void serve(int fd, const Task& task) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    // Ctrl-C goes to the whole group, and the SIGTERM of a batch system to every process of a job, in any order. The parent
-    // decides what is kept: a worker that ended before it had heard would count as a failed run.
-    ::signal(SIGINT, SIG_IGN);
-    ::signal(SIGTERM, SIG_IGN);
+    for (const int signal : kEndings) ::signal(signal, SIG_IGN);
     sigset_t none;
     sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
@@ -90,8 +91,7 @@ Worker start(const Task& task, const std::vector<Worker>& others) {
     // What comes before the worker ignores it waits, and is dropped then.
     sigset_t ends_us, before;
     sigemptyset(&ends_us);
-    sigaddset(&ends_us, SIGINT);
-    sigaddset(&ends_us, SIGTERM);
+    for (const int signal : kEndings) sigaddset(&ends_us, signal);
     ::sigprocmask(SIG_BLOCK, &ends_us, &before);
     worker.process = ::fork();
     if (worker.process != 0) ::sigprocmask(SIG_SETMASK, &before, nullptr);

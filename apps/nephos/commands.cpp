@@ -32,7 +32,8 @@ void add_commands(CLI::App& app, Action& action, const EditFunction& edit) {
         "live\n"
         "\n"
         "Exit status: 0 done, 1 a check failed, 2 usage or scene, 3 input or output, 4 GPU,\n"
-        "             130 stopped by Ctrl-C, 143 by SIGTERM. Results go to stdout, messages to stderr.");
+        "             130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP. Results go to stdout, messages "
+        "to stderr.");
     app.require_subcommand(1);
     add_run_command(app, action);
     add_render_command(app, action);

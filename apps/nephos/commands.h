@@ -65,14 +65,14 @@ std::string usage_line(const CLI::App& app);
 // `shell` is "bash", "zsh" or "fish"; throws Error(usage) on any other.
 std::string completion_script(const CLI::App& app, const std::string& shell);
 
-// Ctrl-C and SIGTERM: the first asks for an orderly end (finish the step, leave a checkpoint), the second,
+// Ctrl-C, SIGTERM and SIGHUP: the first asks for an orderly end (finish the step, leave a checkpoint), the second,
 // unless it comes within 0.3 s, ends the process at once. Also makes failed writes visible as errors where the default is a silent death.
 
 // Installs the handlers; call once at the start of main(). SIGPIPE and SIGXFSZ are ignored, so that a closed
 // pipe and a file-size limit appear as EPIPE and EFBIG at the write that met them.
 void install_signal_handlers();
 
-// Makes the first SIGINT or SIGTERM from now on only be remembered; until this is called it ends the process at
+// Makes the first SIGINT, SIGTERM or SIGHUP from now on only be remembered; until this is called it ends the process at
 // once, since there is nothing to save.
 void defer_signals();
 

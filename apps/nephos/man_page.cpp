@@ -105,7 +105,7 @@ std::string man_page(const CLI::App& app) {
         out +=
             ".SH EXIT STATUS\n0 done, 1 a check failed, 2 usage or scene, 3 input or output, 4 GPU, 130 "
             "stopped by "
-            "Ctrl\\-C, 143 by SIGTERM.\n";
+            "Ctrl\\-C, 143 by SIGTERM, 129 by SIGHUP.\n";
     return out + see_also(app);
 }
 

@@ -30,6 +30,8 @@ int report(const ReportArguments& a) {
     const SweepPlan plan = plan_of_folder(a.folders.front());
     const Records records =
         records_of_folders(plan, std::vector<std::filesystem::path>(a.folders.begin(), a.folders.end()));
+    if (records.size() == 0 && !records.problems().empty())
+        throw Error(ErrorCode::io, records.problems().front());
     if (records.size() == 0)
         throw Error(ErrorCode::usage,
                     a.folders.front() +

@@ -136,10 +136,7 @@ void claim(const std::filesystem::path& folder) {
 bool is_export_folder(const std::filesystem::path& folder) {
     std::error_code error;
     const std::filesystem::path list = folder / "export.json";
-    const std::filesystem::file_status status = std::filesystem::status(list, error);
-    if (status.type() == std::filesystem::file_type::none)
-        throw ReadFailure(list, error.message(), "examine");
-    return std::filesystem::is_regular_file(status);
+    return is_there(list) && std::filesystem::is_regular_file(list, error);
 }
 
 ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences)

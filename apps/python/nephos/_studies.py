@@ -80,6 +80,12 @@ def _column(name, values):
     return numpy.array(values)
 
 
+def _ends_its_last_line(path):
+    with open(path, "rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read() == b"\n"
+
+
 def _table(path):
     """The columns of a table. Raises Error where the file is no whole table."""
     most = csv.field_size_limit(sys.maxsize)  # a value of an axis may be a long one, such as a wind
@@ -95,6 +101,8 @@ def _table(path):
                     raise _error(f"{path}:{rows.line_num}: has {len(row)} values; expected {len(names)}, as the first line has names",
                                  "io", str(path), rows.line_num)
                 lines.append(row)
+            if lines and not _ends_its_last_line(path):
+                raise _error(f"{path}: its last line is cut", "io", str(path))
     except (UnicodeDecodeError, csv.Error) as error:
         raise _error(f"{path}: is damaged: {error}", "io", str(path)) from None
     finally:
@@ -136,7 +144,7 @@ class Sweep:
 
     def report(self, path=None):
         """Writes the sweep as one HTML page, and returns its path (report.html in the folder by default)."""
-        path = pathlib.Path(path) if path is not None else self.folder / "report.html"
+        path = pathlib.Path(os.fsdecode(path)) if path is not None else self.folder / "report.html"
         _call(["report", *map(_path, self._records), "--out", _path(path), "--quiet"])
         return path
 
@@ -162,7 +170,7 @@ def _folder(path):
 
 
 def _pair(name, values, expected):
-    values = tuple(values)
+    values = (values,) if isinstance(values, str) or not hasattr(values, "__iter__") else tuple(values)
     if len(values) != 2:
         raise _error(f"{name} is {values!r}; expected {expected}", "usage")
     return values
@@ -241,7 +249,7 @@ def merge(folders, out=None, *, overwrite=False):
     """Makes the tables of a sweep from the shards in one or several folders, and returns the Sweep; `out` is the first
     folder by default. Runs that are missing yet stand in runs.csv as missing. Raises Error where that would lose runs of earlier
     tables, unless `overwrite`."""
-    folders = [folders] if isinstance(folders, (str, os.PathLike)) else list(folders)
+    folders = [folders] if isinstance(folders, (str, bytes, os.PathLike)) else list(folders)
     if not folders:
         raise _error("folders is empty; expected the folder of a sweep, or several", "usage")
     folders = [_path(folder) for folder in folders]

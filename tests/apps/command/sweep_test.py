@@ -882,14 +882,39 @@ sd = 0.05
 
     def test_a_worker_leaves_the_signal_to_its_parent(self):
         """A batch system may tell a worker first that the job ends: its run is not recorded as failed."""
-        process = self.started("told")
-        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        for child in children:
-            os.kill(int(child), signal.SIGTERM)
-        time.sleep(1)
-        process.send_signal(signal.SIGTERM)
-        self.assertEqual(process.wait(timeout=60), 128 + signal.SIGTERM)
-        self.assertNotIn('"failed"', (self.folder / "told/shards/0000-of-0001.jsonl").read_text())
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            folder = f"told-{int(number)}"
+            process = self.started(folder)
+            children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            for _ in range(2):
+                for child in children:
+                    os.kill(int(child), number)
+                time.sleep(0.5)
+            process.send_signal(number)
+            self.assertEqual(process.wait(timeout=60), 128 + number)
+            self.assertNotIn('"failed"', (self.folder / folder / "shards/0000-of-0001.jsonl").read_text())
+
+    def test_records_that_cannot_be_used_have_a_reason(self):
+        self.sweep("one", steps="20")
+        path = self.folder / "one/shards/0000-of-0001.jsonl"
+        path.write_text(path.read_text().replace('"done"', '"dXne"'))
+        self.refused(3, "report", "one", says="0000-of-0001.jsonl: the record at byte 0 is damaged")
+        # A shard that was never written to has an empty file of series.
+        self.sweep("two", steps="20")
+        before = self.tables("two")
+        path = self.folder / "two/shards/0000-of-0001.jsonl"
+        path.unlink()
+        path.with_suffix(".series").write_text("")
+        self.sweep("two", steps="20")
+        self.assertEqual(self.tables("two"), before)
+        # Shards that were copied together have no plan of their own.
+        for shard in range(2):
+            self.sweep(f"host{shard}", "--shard", f"{shard}/2", steps="20")
+        shutil.copytree(self.folder / "host1/shards", self.folder / "together/shards")
+        self.call("merge", "host0", "host1", "--out", "together")
+        self.assertEqual(self.tables("together"), before)
+        self.assertEqual((self.folder / "together/sweep.toml").read_bytes(), (self.folder / "host0/sweep.toml").read_bytes())
+        self.call("merge", "together", "host0")
 
     def test_a_crash_costs_one_run(self):
         arguments = ["sweep", self.null, "--axis", "field.background.ext=0.05,0.1", "--replicates", "1", "--clouds-every", "0",

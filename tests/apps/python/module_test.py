@@ -309,6 +309,9 @@ class Studies(Case):
             with self.assertRaisesRegex(nephos.Error, says) as caught:
                 sweep.runs()
             self.assertEqual(caught.exception.code, "io")
+        path.write_text(text[:-30])
+        with self.assertRaisesRegex(nephos.Error, "its last line is cut"):
+            sweep.runs()
         path.write_bytes(b"\xff" + text.encode())
         with self.assertRaisesRegex(nephos.Error, "is damaged"):
             sweep.runs()
@@ -321,6 +324,7 @@ class Studies(Case):
             sweep = nephos.sweep(scene, {"field.background.ext": [0.1]}, "-x", replicates=1, steps=(20, 20))
             self.assertTrue(sweep.report().is_file())
             self.assertEqual(len(nephos.merge("-x").runs()["run"]), 1)
+            self.assertEqual(len(nephos.merge(b"-x").runs()["run"]), 1)
             with self.assertRaisesRegex(nephos.Error, "is no folder of a sweep"):
                 nephos.merge("--help")
             name = os.fsdecode(b"cw\xff")  # a current folder that no plan can name
