@@ -15,7 +15,7 @@
 
 namespace nephos {
 
-// How every page begins: what begins otherwise is no report.
+// Begins every page: what begins otherwise is no report.
 inline constexpr std::string_view kReportBeginning =
     "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "

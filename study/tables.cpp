@@ -198,7 +198,7 @@ class UnpackedSeries {
     std::vector<float> current_;
 };
 
-// Where the values of a run lie.
+// Places the values of a run in time and height.
 struct RunCoordinates {
     double step_s, floor_m, level_m;
     bool operator==(const RunCoordinates&) const = default;

@@ -267,7 +267,7 @@ class Child {
     std::string parser_;
 };
 
-// How a message begins that is of the system, and says nothing of what is in the file.
+// Begins a message of the system, which says nothing of what is in the file.
 constexpr std::string_view kCannotRead = "cannot read: ";
 
 void attempt(std::string_view parser, const SandboxLimits& limits, std::span<const int> kept, Clock::time_point deadline,

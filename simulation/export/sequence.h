@@ -34,7 +34,7 @@ struct WindTable {
     std::vector<WindLevel> levels;
 };
 
-// What --range auto divides values by.
+// Bounds what --range auto divides values by.
 inline constexpr double kLeastScale = 1e-30, kLargestScale = 1e30;
 
 struct ExportSequence {

@@ -26,7 +26,7 @@ class Files : public testing::Test {
   protected:
     Files() {
         std::string name = (fs::temp_directory_path() / "nephos files XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+        if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot create a temporary folder");
         folder = fs::canonical(name);
     }
     ~Files() override {
