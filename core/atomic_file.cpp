@@ -27,10 +27,8 @@ namespace {
 void flush_file(const std::filesystem::path& file, const std::filesystem::path& reported) {
     const Descriptor descriptor(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
     if (descriptor.get() < 0) fail(reported, "cannot open after writing", errno);
-    int failed;
-    do failed = ::fsync(descriptor.get());
-    while (failed != 0 && errno == EINTR);
-    if (failed != 0 && errno != EINVAL) fail(reported, "cannot flush to the device", errno);
+    const int error = flush_to_device(descriptor.get());
+    if (error != 0 && error != EINVAL) fail(reported, "cannot flush to the device", error);
 }
 
 // Returns false for a link of another user but root: in a folder that others may write to, it waits there to have a file

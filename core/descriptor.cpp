@@ -100,6 +100,13 @@ bool is_named_pipe(const std::filesystem::path& path) {
     return !error && std::filesystem::exists(name, error);
 }
 
+int flush_to_device(int fd) {
+    int failed;
+    do failed = ::fsync(fd);
+    while (failed != 0 && errno == EINTR);
+    return failed != 0 ? errno : 0;
+}
+
 int write_all(int fd, std::span<const std::byte> content) {
     while (!content.empty()) {
         const ssize_t written = ::write(fd, content.data(), content.size());

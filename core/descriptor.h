@@ -86,6 +86,9 @@ bool is_same_file(int fd, const std::filesystem::path& path);
 // write. The anonymous pipe of a running command (/dev/stdin, a shell's `<(command)`) returns false.
 bool is_named_pipe(const std::filesystem::path& path);
 
+// Flushes what is open to the device, as often as signals interrupt it. Returns 0 or errno.
+int flush_to_device(int fd);
+
 // Writes all of `content`, with as many calls of write(2) as it takes. Returns 0 or errno of the failed call.
 int write_all(int fd, std::span<const std::byte> content);
 

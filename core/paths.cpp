@@ -49,11 +49,9 @@ void flush_folder(const std::filesystem::path& folder, const std::filesystem::pa
     const Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (descriptor.get() < 0 && errno == EACCES) return;
     if (descriptor.get() < 0) fail(reported, "cannot open its folder after writing", std::strerror(errno));
-    int failed;
-    do failed = ::fsync(descriptor.get());
-    while (failed != 0 && errno == EINTR);
-    if (failed != 0 && errno != EINVAL)
-        fail(reported, "cannot flush its folder to the device", std::strerror(errno));
+    const int error = flush_to_device(descriptor.get());
+    if (error != 0 && error != EINVAL)
+        fail(reported, "cannot flush its folder to the device", std::strerror(error));
 }
 
 std::filesystem::path normal_path(const std::filesystem::path& path) {

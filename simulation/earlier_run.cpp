@@ -227,7 +227,8 @@ void remove_leftovers(const RunFolder& folder) {
     for (const std::string& part : frame_parts(folder)) remove_if(part, is_frame);
 }
 
-void refuse_to_lose(const RunFolder& folder, const RunSettings& settings) {
+void refuse_to_lose(const RunFolder& folder, const RunSettings& settings,
+                    const std::vector<RunInput>& inputs) {
     const std::vector<std::filesystem::path> files = earlier_files(folder);
     if (files.empty()) return;
     if (files.back() != folder.manifest()) {
@@ -254,13 +255,12 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings) {
         refuse(folder, fmt::format("it holds a run of '{}' with another scene or seed ({})", earlier.name,
                                    changed_keys(earlier, settings)));
     }
-    const std::string inputs =
-        changed_inputs(earlier.inputs, inputs_of(settings),
-                       {FileKind::first_state, FileKind::simulation, FileKind::picture});
-    if (earlier.simulation_hash != settings.simulation_hash || !inputs.empty()) {
+    const std::string changed = changed_inputs(
+        earlier.inputs, inputs, {FileKind::first_state, FileKind::simulation, FileKind::picture});
+    if (earlier.simulation_hash != settings.simulation_hash || !changed.empty()) {
         refuse(folder, fmt::format("it holds a run of '{}' with another beginning ({})", earlier.name,
-                                   inputs.empty() ? other_content(earlier, settings)
-                                                  : "another content of " + inputs));
+                                   changed.empty() ? other_content(earlier, settings)
+                                                   : "another content of " + changed));
     }
     if (earlier.complete && !makes_again(earlier, settings)) {
         refuse(folder, fmt::format("it holds a complete run for {}, not all of which would be made again",

@@ -24,7 +24,9 @@ void remove_leftovers(const RunFolder& folder);
 
 // Throws Error(usage) when a new run would overwrite something that it cannot make again: an interrupted run,
 // which may hold hours of work, a run of another scene, or a file that no run wrote.
-void refuse_to_lose(const RunFolder& folder, const RunSettings& settings);
+// `inputs`: the files that the scene names, as they are now.
+void refuse_to_lose(const RunFolder& folder, const RunSettings& settings,
+                    const std::vector<RunInput>& inputs);
 
 // What `--resume` finds in a folder.
 enum class Resumption {

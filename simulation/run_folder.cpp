@@ -434,9 +434,10 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     Recorder recorder(settings);     // opens the device
 
     const FolderLock lock(folder.folder, "run");
-    if (resumption == Resumption::nothing_there && !settings.overwrite) refuse_to_lose(folder, settings);
-    if (lock.held()) remove_leftovers(folder);
     std::vector<RunInput> inputs = inputs_of(settings);
+    if (resumption == Resumption::nothing_there && !settings.overwrite)
+        refuse_to_lose(folder, settings, inputs);
+    if (lock.held()) remove_leftovers(folder);
     Simulation& simulation =
         made.emplace(settings.resume   ? resumed_simulation(settings, folder, inputs)
                      : settings.branch ? branched_simulation(settings, folder)

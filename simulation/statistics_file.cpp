@@ -133,10 +133,7 @@ void StatisticsFile::add(std::string_view row) {
 
 void StatisticsFile::save() {
     write_out();
-    int failed;
-    do failed = ::fsync(file_.get());
-    while (failed != 0 && errno == EINTR);
-    if (failed != 0) fail(path_, errno);
+    if (const int error = flush_to_device(file_.get())) fail(path_, error);
     if (!is_same_file(file_.get(), path_))
         throw Error(ErrorCode::io, path_.string() + ": was removed or replaced while the run was writing it");
 }

@@ -26,14 +26,19 @@ bool stands_there(const fs::path& path) {
     return type != fs::file_type::not_found;
 }
 
-bool begins_with(const fs::path& file, std::string_view text) {
+// Returns nothing for what is no file: whatever it is, no sweep wrote it. Throws ReadFailure.
+std::string beginning_of(const fs::path& file, std::size_t most) {
     try {
-        return read_beginning(file, text.size()) == text;
+        return read_beginning(file, most);
     } catch (const ReadFailure&) {
         throw;  // which says nothing of its content
     } catch (const Error&) {
-        return false;  // whatever it is, no sweep wrote it
+        return {};
     }
+}
+
+bool begins_with(const fs::path& file, std::string_view text) {
+    return beginning_of(file, text.size()) == text;
 }
 
 constexpr std::string_view kSweepManifest = "{\n  \"format\": \"nephos sweep\"",
@@ -60,14 +65,8 @@ bool is_unmarked(const fs::path& folder, std::string_view name) {
 // NetCDF of a sweep: its title stands behind its few dimensions.
 bool is_series_of_sweep(const fs::path& file) {
     constexpr std::size_t kHead = 4096;
-    try {
-        const std::string head = read_beginning(file, kHead);
-        return head.starts_with("CDF") && head.find(kSweepTitle) != head.npos;
-    } catch (const ReadFailure&) {
-        throw;
-    } catch (const Error&) {
-        return false;
-    }
+    const std::string head = beginning_of(file, kHead);
+    return head.starts_with("CDF") && head.find(kSweepTitle) != head.npos;
 }
 
 }  // namespace

@@ -150,7 +150,7 @@ SweepOptions read_sweep_text(std::string text, const std::filesystem::path& path
 bool is_sweep_text(const std::string& text, const std::filesystem::path& path) {
     bool has_scene = false;
     try {
-        // What else is in the file is unknown here, and reported by whoever reads it for good.
+        // Leaves what else is wrong to whoever reads the file for good.
         read_toml_text(text, path.string(), [&](TomlTable& table) { has_scene = table.has("scene"); });
     } catch (const SceneErrors&) {
     }
