@@ -199,12 +199,16 @@ nlohmann::ordered_json parsed_json_text(std::string_view text, JsonLists lists, 
     return Json(Json::value_t::discarded);
 }
 
-nlohmann::ordered_json parsed_json(const std::filesystem::path& file, JsonLists lists) {
+std::string read_json_text(const std::filesystem::path& file) {
     require_regular_file(file);
     std::error_code failure;
     const std::uintmax_t bytes = std::filesystem::file_size(file, failure);
     if (failure) throw ReadFailure(file, failure.message());
-    const std::string text = read_beginning(file, std::size_t(bytes));
+    return read_beginning(file, std::size_t(bytes));
+}
+
+nlohmann::ordered_json parsed_json(const std::filesystem::path& file, JsonLists lists) {
+    const std::string text = read_json_text(file);
     std::size_t error = 0;
     Json json = parsed_json_text(text, lists, &error);
     if (!json.is_discarded()) return json;

@@ -23,6 +23,7 @@
 #include "scenes/format/writer.h"
 #include "simulation/checked_json.h"
 #include "simulation/scene_place.h"
+#include "simulation/sealed_json.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -294,7 +295,12 @@ FileRecord file_record(const Json& json, const std::filesystem::path& manifest) 
 
 void write_manifest(const RunSettings& settings, const ManifestState& state) {
     const RunFolder folder{settings.folder, settings.scene.name};
-    write_pieces_atomically(folder.manifest(), [&](const AppendPiece& append) {
+    write_pieces_atomically(folder.manifest(), [&](const AppendPiece& append_to_file) {
+        Digest digest;
+        const auto append = [&](std::string_view piece) {
+            digest.add(piece);
+            append_to_file(piece);
+        };
         append("{\n" + members(head_json(settings, state)) + ",\n  \"frames\": [");
         std::string_view separator = "\n";
         for (const FrameRecord& frame : state.frames) {
@@ -309,7 +315,8 @@ void write_manifest(const RunSettings& settings, const ManifestState& state) {
             {"scene_text", settings.scene_text},
             {"scene_given", given_toml(settings.scene)},
             {"timing", {{"wall_s", state.wall_s}, {"backend", state.backend}, {"device", state.device}}}});
-        append("\n  ],\n" + members(tail) + "\n}\n");
+        append("\n  ],\n" + members(tail));
+        append_to_file(seal_text(digest));
     });
 }
 

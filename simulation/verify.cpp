@@ -2,55 +2,27 @@
 #include "simulation/verify.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
-#include <optional>
 #include <set>
-#include <span>
+#include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "automaton/checkpoint.h"
 #include "core/descriptor.h"
 #include "core/digest.h"
 #include "core/error.h"
-#include "density/combine.h"
-#include "density/vdb/vdb_file.h"
-#include "density/voxel_digest.h"
-#include "scenes/format/errors.h"
-#include "scenes/format/writer.h"
-#include "simulation/branch.h"
-#include "simulation/run_inputs.h"
 #include "simulation/run_listing.h"
-#include "simulation/scene_place.h"
-#include "simulation/verify_motion.h"
+#include "simulation/sealed_json.h"
+#include "simulation/verify_content.h"
+#include "simulation/verify_problems.h"
+#include "simulation/verify_replay.h"
 
 namespace nephos {
 namespace {
-
-constexpr std::size_t kNamed = 3;  // problems of one kind that are named
-constexpr double kLayersTolerance = 1e-3;
-
-// Counts problems of one kind, and names the first of them.
-class Problems {
-  public:
-    void add(const std::string& text) {
-        if (++count_ <= kNamed) text_ += (text_.empty() ? "" : "; ") + text;
-    }
-    bool none() const { return count_ == 0; }
-    // The text of the check: the problems, or what is said without any.
-    Check check(const std::string& name, const std::string& otherwise) const {
-        std::string text = count_ > kNamed ? fmt::format("{}; and {} more", text_, count_ - kNamed) : text_;
-        return {name, none(), none() ? otherwise : text};
-    }
-
-  private:
-    std::size_t count_ = 0;
-    std::string text_;
-};
 
 // Files of frames below the folder that the manifest does not list.
 std::vector<std::filesystem::path> extra_files(const RunListing& run, const std::set<std::string>& listed) {
@@ -88,248 +60,6 @@ Check check_numbers(const RunListing& run) {
         "frames", fmt::format("{} frames, {} to {}, no gap", numbers.size(), run.range.first_frame, last));
 }
 
-// Judges the density of each file as a reader sees it.
-class Decoder {
-  public:
-    explicit Decoder(const RunListing& run) : run_(run) {}
-
-    void unreadable(const Error& error) { voxels_.add(error.what()); }
-
-    void add(const ListedFrame& frame, const FileRecord& file, const LoadedDensity& loaded) {
-        ++count_;
-        for (const std::string& note : loaded.notes) values_.add(file.path + ": " + note);
-        const float most = loaded.density.max_value();
-        largest_ = std::max(largest_, double(most));
-        if (most > 1) values_.add(fmt::format("{}: a value of {:g} is above 1", file.path, most));
-        if (!file.voxels.empty() && voxel_digest(loaded.density) != file.voxels)
-            voxels_.add(file.path + ": its voxels are not those of the manifest");
-        check_metadata(frame, file, loaded);
-        check_geometry(file, loaded.info);
-    }
-
-    std::vector<Check> checks() const {
-        return {voxels_.check("voxels",
-                              fmt::format("{} density files decode to the voxels of the manifest", count_)),
-                values_.check("values", fmt::format("finite, 0 to {:.4g}", largest_)),
-                geometry_.check("geometry", "same transform, bounds and class in every file of a kind"),
-                metadata_.check("metadata", "time, extinction, scene and state as in the manifest")};
-    }
-
-  private:
-    void check_metadata(const ListedFrame& frame, const FileRecord& file, const LoadedDensity& loaded) {
-        if (!loaded.metadata) return metadata_.add(file.path + ": has no metadata of nephos");
-        const VdbMetadata& m = *loaded.metadata;
-        if (m.time_s != frame.time_s)
-            metadata_.add(
-                fmt::format("{}: time {} s, {} in the manifest", file.path, m.time_s, frame.time_s));
-        if (m.extinction_per_m != run_.scene.density.extinction_per_m)
-            metadata_.add(fmt::format("{}: extinction {} per m", file.path, m.extinction_per_m));
-        if (m.scene_hash != run_.frames_hash) metadata_.add(file.path + ": is of another scene");
-        if (run_.scene.layers.empty() && m.state_hash != frame.state_hash)
-            metadata_.add(file.path + ": is of another state");
-        if (!(m.georeference == run_.scene.georeference))
-            metadata_.add(file.path + ": lies at another place");
-    }
-
-    // Grids that hold only a part of the box (hum, act, cld, the wind) have its transform, not its bounds.
-    void check_geometry(const FileRecord& file, const VdbInfo& info) {
-        const std::string kind = std::filesystem::path(file.path).parent_path().generic_string();
-        for (const VdbGridInfo& grid : info.grids) {
-            VdbGridInfo expected = grid;
-            const auto [first, added] = first_.try_emplace(kind + ":" + grid.name, grid);
-            if (grid.name == "density" && grid.grid_class != "fog volume")
-                geometry_.add(file.path + ": `density` is of class " + grid.grid_class);
-            if (added) continue;
-            const VdbGridInfo& other = first->second;
-            if (other.world_from_index != grid.world_from_index)
-                geometry_.add(file.path + ": `" + grid.name + "` has another transform");
-            if (grid.name == "density" && !(other.active_box == grid.active_box))
-                geometry_.add(file.path + ": has other bounds");
-            if (other.grid_class != grid.grid_class || other.type != grid.type)
-                geometry_.add(file.path + ": `" + grid.name + "` is of another class or type");
-        }
-    }
-
-    const RunListing& run_;
-    Problems voxels_, values_, geometry_, metadata_;
-    std::map<std::string, VdbGridInfo> first_;
-    std::size_t count_ = 0;
-    double largest_ = 0;
-};
-
-// Voxels that are compared one by one: as floats they take 1 GiB. Boxes between layers that lie far apart have many, and
-// hardly any with cloud.
-constexpr std::size_t kMostCompared = std::size_t(1) << 28;
-
-bool is_too_large(const DensityGrid& grid) { return grid.extent().cells() > kMostCompared; }
-
-std::string not_compared(const DensityGrid& grid) {
-    return fmt::format("not done: the box has {} voxels, of which at most {} are compared",
-                       grid.extent().cells(), kMostCompared);
-}
-
-// The density of layers must be that of the file of all together.
-void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
-                    const std::vector<DensityGrid>& layers, const std::vector<Boundaries>& boundaries,
-                    double& largest, Problems& problems) {
-    const DensityGrid sum = combine(layers, boundaries);
-    if (!(sum.extent() == whole.extent())) {
-        problems.add(fmt::format("frame {}: the layers' box is another", frame.number));
-        return;
-    }
-    const std::vector<float> a = sum.to_dense(), b = whole.to_dense();
-    double difference = 0;
-    for (std::size_t n = 0; n < a.size(); ++n)
-        difference = std::max(difference, double(std::abs(a[n] - b[n])));
-    largest = std::max(largest, difference);
-    if (difference > kLayersTolerance)
-        problems.add(fmt::format("frame {}: the layers differ from the common grid by {:.3g}", frame.number,
-                                 difference));
-}
-
-Check check_seams(const RunListing& run, const DensityGrid& grid, bool all) {
-    if (is_too_large(grid))
-        return {"seam", !all, not_compared(grid), {}, !all};  // asked for, it has not passed
-    const Vec3 period = period_m(run.scene, std::nullopt);
-    const std::vector<float> density = grid.to_dense();
-    Check check{"seam", true, {}};
-    const char* const names[] = {"x", "y"};
-    for (int axis = 0; axis < 2; ++axis) {
-        const Extent e = grid.extent();
-        if (!all && period[axis] == 0) continue;
-        const Seam seam = seam_of(density, e.x, e.y, e.z, axis);
-        check.passed = check.passed && !seam.shows();
-        check.detail += fmt::format("{}{}: {:.3g} at the seam, at most {:.3g} inside, shows above {:.3g}{}",
-                                    check.detail.empty() ? "" : "; ", names[axis], seam.at_seam, seam.inside,
-                                    seam.limit, seam.shows() ? " (the seam shows)" : "");
-        check.figures.emplace_back(fmt::format("{}_seam", names[axis]), seam.at_seam);
-        check.figures.emplace_back(fmt::format("{}_inside", names[axis]), seam.inside);
-        check.figures.emplace_back(fmt::format("{}_limit", names[axis]), seam.limit);
-    }
-    if (check.detail.empty()) check.detail = "no axis repeats";
-    return check;
-}
-
-// Compares the files of each frame with each other and with those of the frame before.
-class Frames {
-  public:
-    explicit Frames(const RunListing& run) : run_(run) {}
-
-    // `grids`: by their path in the folder, all that could be read of one frame; frames come in order.
-    void add(const ListedFrame& frame, std::map<std::string, DensityGrid> grids) {
-        if (grids.empty()) return;
-        const RunFolder folder{run_.folder, run_.scene.name};
-        const auto find = [&](const std::filesystem::path& path) {
-            return grids.find(path.lexically_relative(run_.folder).generic_string());
-        };
-        std::vector<DensityGrid> layers;
-        std::vector<Boundaries> boundaries;
-        for (const LayerOptions& layer : run_.scene.layers) {
-            const auto found = find(folder.density(frame.number, layer.name));
-            if (found == grids.end()) continue;
-            layers.push_back(found->second);
-            boundaries.push_back(layer.boundaries);
-        }
-        const auto whole = find(folder.density(frame.number));
-        const auto expected =
-            std::ranges::count_if(run_.scene.layers, [](const auto& layer) { return has_density(layer); });
-        if (whole != grids.end() && !layers.empty() && std::ssize(layers) == expected) {
-            if (is_too_large(whole->second)) {
-                too_large_ = not_compared(whole->second);
-            } else {
-                compare_layers(frame, whole->second, layers, boundaries, largest_, sums_);
-                ++compared_;
-            }
-        }
-        last_ = whole != grids.end() ? whole->second : grids.begin()->second;
-        if (!is_too_large(*last_)) motion_.add(*last_);
-    }
-
-    void checks(const VerifyOptions& options, std::vector<Check>& checks) const {
-        if (compared_ > 0) {
-            checks.push_back(sums_.check(
-                "layers",
-                fmt::format("add up to the common grid within {:.2g} in {} frames", largest_, compared_)));
-        } else if (!too_large_.empty()) {
-            checks.push_back({"layers", true, too_large_});
-        }
-        if (!last_) return;
-        checks.push_back(check_seams(run_, *last_, options.seam));
-        if (is_too_large(*last_)) {
-            const bool is_asked = options.max_change.has_value();
-            checks.push_back({"motion", !is_asked, not_compared(*last_), {}, !is_asked});
-        } else {
-            checks.push_back(motion_.check(options.max_change));
-        }
-    }
-
-  private:
-    const RunListing& run_;
-    SequenceMotion motion_;
-    Problems sums_;
-    double largest_ = 0;
-    std::size_t compared_ = 0;
-    std::string too_large_;  // why frames were not compared
-    std::optional<DensityGrid> last_;
-};
-
-// Decodes every density file. One process reads ahead; what it cannot read is tried once more alone, which tells whose
-// fault it is, and the rest goes on.
-void check_content(const RunListing& run, const VerifyOptions& options, std::vector<Check>& checks) {
-    struct Source {
-        const ListedFrame* frame;
-        const FileRecord* file;
-    };
-    std::vector<Source> sources;
-    std::vector<std::filesystem::path> paths;
-    for (const ListedFrame& frame : run.frames) {
-        for (const FileRecord& file : frame.files) {
-            if (!file.path.ends_with(".vdb")) continue;
-            sources.push_back({&frame, &file});
-            paths.push_back(run.folder / file.path);
-        }
-    }
-    VdbReadOptions reading;
-    reading.list_grids = true;
-    Decoder decoder(run);
-    Frames frames(run);
-    std::map<std::string, DensityGrid> grids;
-    std::size_t next = 0;
-    const auto finish_file = [&] {
-        const ListedFrame* frame = sources[next].frame;
-        if (++next == sources.size() || sources[next].frame != frame)
-            frames.add(*frame, std::exchange(grids, {}));
-    };
-    const auto take = [&](LoadedDensity&& loaded) {
-        const auto& [frame, file] = sources[next];
-        decoder.add(*frame, *file, loaded);
-        grids.emplace(file->path, std::move(loaded.density));
-        finish_file();
-    };
-    while (next < paths.size()) {
-        const std::size_t before = next;
-        try {
-            load_densities(std::span(paths).subspan(next), reading, [&](std::size_t, LoadedDensity&& loaded) {
-                take(std::move(loaded));
-                return true;
-            });
-        } catch (const Error& error) {
-            if (next > before) continue;
-            try {
-                take(load_density(paths[next], reading));
-            } catch (const ReadFailure&) {
-                throw;  // which says nothing of its content
-            } catch (const Error& alone) {
-                if (!std::string_view(alone.what()).starts_with(paths[next].string())) throw;  // nor this
-                decoder.unreadable(alone);
-                finish_file();
-            }
-        }
-    }
-    for (Check& check : decoder.checks()) checks.push_back(std::move(check));
-    frames.checks(options, checks);
-}
-
 Check compare_runs(const RunListing& run, const std::filesystem::path& other_folder) {
     const RunListing other = read_run(other_folder);
     Problems problems;
@@ -352,97 +82,6 @@ Check compare_runs(const RunListing& run, const std::filesystem::path& other_fol
                                                  other_folder.string(), run.frames.size()));
 }
 
-// Compares frames that are simulated anew with those of the manifest.
-class Replay : public SimulationSink {
-  public:
-    explicit Replay(const RunListing& run) {
-        for (const ListedFrame& frame : run.frames) frames_[frame.number] = &frame;
-        plain_ = run.scene.density.refine == 1;
-        half_ = run.scene.density.half;
-        folder_ = {run.folder, run.scene.name};
-    }
-    void step(const StepResult&) override {}
-    void frame(const FrameResult& frame) override {
-        const auto found = frames_.find(frame.number);
-        if (found == frames_.end()) return;
-        ++count;
-        if (found->second->state_hash != frame.hash.hex())
-            return problems.add(fmt::format("frame {}: state {}, {} in the manifest", frame.number,
-                                            frame.hash.hex(), found->second->state_hash));
-        const std::string name =
-            folder_.density(frame.number).lexically_relative(folder_.folder).generic_string();
-        for (const FileRecord& file : found->second->files) {
-            if (plain_ && file.path == name && file.voxels != voxel_digest(frame.density, half_))
-                problems.add(fmt::format("frame {}: other voxels", frame.number));
-        }
-    }
-    Problems problems;
-    int count = 0;
-
-  private:
-    std::map<int, const ListedFrame*> frames_;
-    RunFolder folder_;
-    bool plain_ = true, half_ = false;
-};
-
-// Returns the simulation of a branch as it began.
-Simulation branch_anew(const RunListing& run, const Scene& scene) {
-    const BranchPoint& point = *run.branch;
-    const std::filesystem::path file = point.place.empty() ? point.checkpoint : point.place;
-    if (!is_there(file))
-        throw Error(ErrorCode::io,
-                    fmt::format("{}: the checkpoint that the run branched off is not there any more",
-                                point.checkpoint.string()));
-    const Checkpoint checkpoint = read_checkpoint(file);
-    if (!is_branch_point(checkpoint, point, scene, run.simulation_hash))
-        throw Error(
-            ErrorCode::io,
-            fmt::format(
-                "{}: is not the checkpoint any more that the run branched off, but one after {} steps of a "
-                "run that went on or began anew",
-                point.checkpoint.string(), checkpoint.steps));
-    return {scene,          run.range, run.simulation_hash, checkpoint, SimulationResults::everything,
-            Restart::branch};
-}
-
-// Returns the simulation of frames from step 0 on.
-Simulation run_anew(const RunListing& run, const Scene& scene, const SimulationRange& range) {
-    SimulationStart start = simulation_start(scene);
-    if (start.simulation_hash != run.simulation_hash) {
-        const std::vector<RunInput> now =
-            inputs_of(scene, run.folder, {.first_states = true, .pictures = false});
-        const std::string changed =
-            changed_inputs(run.inputs, now, {FileKind::first_state, FileKind::simulation});
-        if (!changed.empty()) throw Error(ErrorCode::io, "the content is not as it was: " + changed);
-        if (run.inputs.empty() && !now.empty())
-            throw Error(ErrorCode::io,
-                        "the files that the scene names are others than those of the run, whose manifest is "
-                        "of an earlier version and does not say which");
-    }
-    return {scene, range, run.simulation_hash, std::move(start.initial)};
-}
-
-Check replay_frames(const RunListing& run, int count) {
-    Replay sink(run);
-    try {
-        if (run.frames.empty()) return {"replay", true, "there is no frame to simulate"};
-        const int first = run.frames.front().number;
-        const int last = std::min(run.frames.back().number, first + count - 1);
-        Scene scene = run.scene;
-        locate_inputs(scene, run.folder, run.inputs);
-        Simulation simulation =
-            run.branch ? branch_anew(run, scene) : run_anew(run, scene, range_of_frames(scene, first, last));
-        while (!simulation.finished() && simulation.next_frame() <= last) simulation.advance(sink);
-    } catch (const Error& error) {
-        const auto* errors = dynamic_cast<const SceneErrors*>(&error);
-        const std::string text = errors != nullptr ? errors->problems().front().message : error.what();
-        if (error.code() != ErrorCode::io) return {"replay", false, text};
-        return {"replay", false, "cannot be done: " + text, {}, false};
-    }
-    return sink.problems.check(
-        "replay", fmt::format("{} frames simulated anew have the same states and voxels", sink.count));
-}
-
 }  // namespace
 
 bool Verification::passed() const {
@@ -453,39 +92,9 @@ bool Verification::failed() const {
     return std::ranges::any_of(checks, [](const Check& check) { return check.done && !check.passed; });
 }
 
-Seam seam_of(const std::vector<float>& density, int nx, int ny, int nz, int axis) {
-    const int n = axis == 0 ? nx : axis == 1 ? ny : nz;
-    const std::size_t stride = axis == 0   ? 1
-                               : axis == 1 ? std::size_t(nx)
-                                           : std::size_t(nx) * std::size_t(ny);
-    std::vector<double> planes(std::size_t(n), 0.0);
-    for (std::size_t at = 0; at < density.size(); ++at) {
-        const int i = int(at / stride % std::size_t(n));
-        const std::size_t base = at - std::size_t(i) * stride;
-        const auto value = [&](int k) { return double(density[base + std::size_t((k + n) % n) * stride]); };
-        planes[std::size_t(i)] += std::abs(value(i - 1) - 2 * value(i) + value(i + 1));
-    }
-    constexpr double kDeviations = 4;
-    const double count = double(density.size()) / n;
-    Seam seam;
-    double sum = 0, squares = 0;
-    for (int i = 0; i < n; ++i) {
-        const double roughness = planes[std::size_t(i)] / count;
-        const bool at_seam = i == 0 || i == n - 1;
-        double& most = at_seam ? seam.at_seam : seam.inside;
-        most = std::max(most, roughness);
-        if (at_seam) continue;
-        sum += roughness;
-        squares += roughness * roughness;
-    }
-    const double inner = std::max(1, n - 2), mean = sum / inner;
-    seam.limit = std::max(seam.inside, mean + kDeviations * std::sqrt(std::max(0.0, squares / inner - mean * mean)));
-    return seam;
-}
-
 std::vector<Check> check_files(const std::filesystem::path& folder, const std::vector<ListedFile>& files,
                                const std::vector<std::filesystem::path>& extra) {
-    std::vector<std::string> wrong(files.size()), missing(files.size());
+    std::vector<std::string> wrong(files.size()), missing(files.size()), unread(files.size());
     tbb::parallel_for(std::size_t(0), files.size(), [&](std::size_t n) {
         const std::filesystem::path path = folder / files[n].path;
         try {
@@ -500,28 +109,48 @@ std::vector<Check> check_files(const std::filesystem::path& folder, const std::v
             else if (found.xxh3 != files[n].xxh3)
                 wrong[n] = fmt::format("{}: its bytes are not those that were written",
                                        files[n].path.generic_string());
-        } catch (const ReadFailure&) {
-            throw;
+        } catch (const ReadFailure& failure) {
+            unread[n] = failure.what();
         } catch (const Error& error) {
             wrong[n] = error.what();
         }
     });
-    Problems presence, content;
-    for (const std::string& text : missing)
-        if (!text.empty()) presence.add(text);
+    Problems presence, content, reading;
+    const auto add = [](Problems& problems, const std::vector<std::string>& texts) {
+        for (const std::string& text : texts)
+            if (!text.empty()) problems.add(text);
+    };
+    add(presence, missing);
+    add(content, wrong);
+    add(reading, unread);
     for (const std::filesystem::path& path : extra)
         presence.add(path.generic_string() + " is listed nowhere");
     std::uint64_t bytes = 0;
     for (const ListedFile& file : files) bytes += file.bytes;
-    for (const std::string& text : wrong)
-        if (!text.empty()) content.add(text);
-    return {presence.check("files", fmt::format("{} files, none missing, none extra", files.size())),
-            content.check("hashes", fmt::format("{} bytes agree with their checksums", bytes))};
+    std::vector<Check> checks{
+        presence.check("files", fmt::format("{} files, none missing, none extra", files.size())),
+        content.check("hashes", fmt::format("{} bytes agree with their checksums", bytes))};
+    if (!reading.none()) checks.push_back(reading.not_done("reading"));
+    return checks;
+}
+
+Check check_list(const std::filesystem::path& list) {
+    Check check{"list", true, list.filename().string() + " is as it was written"};
+    switch (seal_of(list)) {
+        case Seal::whole:
+            break;
+        case Seal::none:
+            check.detail = list.filename().string() + ", of an earlier version, has no checksum";
+            break;
+        case Seal::broken:
+            check = {"list", false, list.filename().string() + ": its bytes are not those that were written"};
+    }
+    return check;
 }
 
 Verification verify_run(const std::filesystem::path& folder, const VerifyOptions& options) {
     const RunListing run = read_run(folder);
-    Verification result{"run", {}};
+    Verification result{"run", {check_list(folder / "manifest.json")}};
     result.checks.push_back(check_numbers(run));
     std::vector<ListedFile> files;
     std::set<std::string> names;

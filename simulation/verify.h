@@ -54,9 +54,14 @@ struct ListedFile {
     std::string xxh3;
 };
 
-// Checks that all files are there and have their size and checksum: two lines, which name the first problems. `extra`: files that are there and should not be.
+// Checks that all files are there and have their size and checksum: two lines, which name the first problems, and one more,
+// which was not done, where the system cannot read some. `extra`: files that are there and should not be.
 std::vector<Check> check_files(const std::filesystem::path& folder, const std::vector<ListedFile>& files,
                                const std::vector<std::filesystem::path>& extra);
+
+// Checks that the list itself, manifest.json or export.json, is as it was written, by the checksum at its end. Throws
+// Error(io) as open_regular_file().
+Check check_list(const std::filesystem::path& list);
 
 // The roughness of a volume where it would meet its own repetition along an axis, 0 = x, against its inside: mean
 // absolute second differences across planes of voxels. Density, x fastest, size.x * size.y * size.z of it.

@@ -63,8 +63,9 @@ int verify(const VerifyArguments& a) {
     if (result.passed()) return 0;
     if (!result.failed()) {
         const auto none = std::ranges::find(result.checks, false, &Check::done);
-        throw Error(ErrorCode::io, fmt::format("{}: nothing is wrong, but the check `{}` could not be done", a.folder,
-                                               none == result.checks.end() ? "" : none->name));
+        throw Error(ErrorCode::io,
+                    fmt::format("{}: nothing is wrong, but the check `{}` could not be done: {}", a.folder,
+                                none->name, none->detail));
     }
     throw Error(ErrorCode::check, a.folder + ": the " + result.kind + " is not what it claims to be");
 }

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "simulation/checked_json.h"
 #include "simulation/manifest.h"
+#include "simulation/sealed_json.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -151,6 +152,7 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
         files.push_back(file_of(file));
     json.erase("files");
     json.erase("complete");
+    json.erase(kSealKey);
     if (json.dump(2, ' ', false, Json::error_handler_t::replace) != head_)
         throw Error(ErrorCode::usage,
                     folder_.string() +
@@ -216,7 +218,7 @@ void ExportList::write(bool complete) const {
         if (!complete && !listed.contains(path)) add(file);
     json["files"] = std::move(files);
     write_atomically(folder_ / "export.json",
-                     std::string_view(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"));
+                     std::string_view(sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace))));
 }
 
 std::vector<std::string> ExportList::remove_left_over() const {

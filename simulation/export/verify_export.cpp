@@ -206,7 +206,7 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
     if (options.against || options.replay > 0)
         throw Error(ErrorCode::usage,
                     folder.string() + ": is an export; --against and --replay are for runs");
-    Verification result{"export", {}};
+    Verification result{"export", {check_list(folder / "export.json")}};
     if (!list.complete)
         result.checks.push_back({"complete", false, "the export was interrupted: the same command goes on"});
     std::vector<ListedFile> files;

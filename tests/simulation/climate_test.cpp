@@ -431,8 +431,8 @@ TEST(Climate, ARunHasFilesOfEveryLayerAndCanBeResumed) {
 
     auto whole = nlohmann::json::parse(content(settings.folder / "manifest.json"));
     auto joined = nlohmann::json::parse(content(parts.folder / "manifest.json"));
-    whole.erase("timing");
-    joined.erase("timing");
+    for (const char* own : {"timing", "xxh3"}) whole.erase(own);
+    for (const char* own : {"timing", "xxh3"}) joined.erase(own);
     EXPECT_EQ(nlohmann::json::diff(whole, joined).dump(), "[]");
     for (const char* file : {"statistics.csv", "statistics/low.csv", "statistics/middle.csv",
                              "statistics/high.csv", "checkpoint.nephos"}) {

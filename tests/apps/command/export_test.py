@@ -12,7 +12,7 @@ import unittest
 
 import numpy
 
-from case import NEPHOS, Case, SCENE, SOURCE, limit_addresses, voxels
+from case import NEPHOS, Case, SCENE, SOURCE, limit_addresses, voxels, unsealed
 from verify_test import LAYERED, PLACED
 
 
@@ -213,7 +213,7 @@ class Export(Case):
         folder = self.export("out", "--to", "raw")
         listing = json.loads((folder / "export.json").read_text())
         listing["complete"] = False
-        (folder / "export.json").write_text(json.dumps(listing))
+        (folder / "export.json").write_text(unsealed(listing))
         (folder / "placed_0002.raw").write_bytes(b"damaged")
         (folder / "placed_0004.raw").unlink()
         before = (folder / "placed_0001.raw").stat().st_mtime_ns
@@ -270,7 +270,7 @@ class Export(Case):
         folder = self.export("alone", "--to", "raw")
         listing = json.loads((folder / "export.json").read_text())
         listing["files"] = [file for file in listing["files"] if not file["path"].endswith(".volume.json")]
-        (folder / "export.json").write_text(json.dumps(listing))
+        (folder / "export.json").write_text(unsealed(listing))
         (folder / "placed.volume.json").unlink()
         self.assertIn("lists volumes, but no placed.volume.json", self.call("verify", folder, status=1).stdout)
         # No source.
@@ -430,7 +430,7 @@ class Export(Case):
             for key in place[:-1]:
                 at = at[key]
             at[place[-1]] = value
-            (folder / "export.json").write_text(json.dumps(listing))
+            (folder / "export.json").write_text(unsealed(listing))
         layout = ["sequences", 0, "layout"]
         for place, value, says in (
                 (["sequences", 0, "levels"], 0, "`sequences[0].levels` is 0: expected a whole number from 1 to 32"),
@@ -460,17 +460,17 @@ class Export(Case):
         (folder / "export.json").write_text("{\n\"format\": ")
         self.refused(3, "verify", "out", says="line 2 cannot be read")
         # Many keys, and keys twice, of which the last counts; a long one is shortened.
-        text = json.dumps(whole)
+        text = unsealed(whole)
         many = "".join(f'"k{n}": [], ' for n in range(100_000))
         (folder / "export.json").write_text(f"{{{many}\"complete\": 7, {text[1:]}")
         self.call("verify", "out")
         listing = json.loads(text)
         listing["options"]["types"]["n" * 100_000] = 77
-        (folder / "export.json").write_text(json.dumps(listing))
+        (folder / "export.json").write_text(unsealed(listing))
         self.assertLess(len(self.refused(3, "verify", "out", says="`options.types." + "n" * 60 + "...` is 77").stderr), 400)
         listing = dict(whole)
         del listing["options"]
-        (folder / "export.json").write_text(json.dumps(listing))
+        (folder / "export.json").write_text(unsealed(listing))
         self.refused(3, "verify", "out", says="`options` is missing")
 
     def relisted(self, folder, name):
@@ -481,7 +481,7 @@ class Export(Case):
         for file in listing["files"]:
             if file["path"] == name:
                 file.update(bytes=len(content), xxh3=xxhash.xxh3_128_hexdigest(content))
-        (folder / "export.json").write_text(json.dumps(listing))
+        (folder / "export.json").write_text(unsealed(listing))
 
     def test_sidecars_that_lie(self):
         folder = self.export("out", "--to", "raw", "--type", "r8", "--mips", "--pad", "64")

@@ -155,6 +155,19 @@ class Faults(Case):
                     self.assertNotIn("--overwrite", result.stderr)
         self.assertEqual(self.run_into("out", "--resume").returncode, 0)
 
+    def test_what_verify_cannot_read_hides_nothing(self):
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        unread = {"env": self.failing("read EIO 1 1000", "tiny_0002.vdb")}
+        result = self.call("verify", "out", status=3, **unread)
+        self.assertIn("none  reading   out/density/tiny_0002.vdb: cannot read: Input/output error", result.stdout)
+        self.assertIn("none  decoding  out/density/tiny_0002.vdb: cannot read: Input/output error", result.stdout)
+        self.assertIn("ok    hashes", result.stdout)
+        self.assertIn("nothing is wrong, but the check `reading` could not be done: out/density/tiny_0002.vdb", result.stderr)
+        (self.folder / "out/density/tiny_0003.vdb").write_bytes(b"damaged")
+        result = self.call("verify", "out", status=1, **unread)
+        self.assertIn("FAIL  hashes    density/tiny_0003.vdb: 7 bytes, not", result.stdout)
+        self.assertIn("tiny_0002.vdb: cannot read", result.stdout)
+
     def fails_at_each_call(self, call, path, *arguments):
         """Lets one call on a file fail after the other, also in the process that parses it; returns how many there are."""
         for number in range(1, 100):

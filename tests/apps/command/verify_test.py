@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import unittest
 
-from case import Case, NEPHOS, SCENE
+from case import Case, NEPHOS, SCENE, unsealed
 
 PLACED = SCENE + """\
 [georeference]
@@ -63,7 +63,7 @@ class Verify(Case):
     def test_a_run_is_what_it_says(self):
         self.call("run", self.scene, "--out", "out", "--set", "frames.exr=true")
         checks = self.checks("out", "--replay", 2)
-        self.assertEqual({"frames", "files", "hashes", "voxels", "values", "geometry", "metadata", "seam", "motion", "replay"},
+        self.assertEqual({"list", "frames", "files", "hashes", "voxels", "values", "geometry", "metadata", "seam", "motion", "replay"},
                          set(checks))
         self.assertGreater(checks["motion"]["figures"]["largest_change"], 0)
         manifest = json.loads((self.folder / "out/manifest.json").read_text())
@@ -111,13 +111,13 @@ class Verify(Case):
         def forget(out):
             manifest = json.loads((out / "manifest.json").read_text())
             del manifest["frames"][2]
-            (out / "manifest.json").write_text(json.dumps(manifest))
+            (out / "manifest.json").write_text(unsealed(manifest))
         self.assertEqual(["files", "frames"], damaged(forget))
 
         def promise(out):
             manifest = json.loads((out / "manifest.json").read_text())
             manifest["range"]["last_frame"] = 900_000
-            (out / "manifest.json").write_text(json.dumps(manifest))
+            (out / "manifest.json").write_text(unsealed(manifest))
         self.assertIn("frames", damaged(promise))
         frames = json.loads((self.folder / "whole/manifest.json").read_text())["frames"]
         self.assertIn(f"frames {frames[-1]['number'] + 1} to 900000 are missing", self.call("verify", "out", status=1).stdout)
@@ -125,9 +125,35 @@ class Verify(Case):
         def lie(out):
             manifest = json.loads((out / "manifest.json").read_text())
             manifest["frames"][1]["state_hash"] = "0" * 32
-            (out / "manifest.json").write_text(json.dumps(manifest))
+            (out / "manifest.json").write_text(unsealed(manifest))
         self.assertEqual(["metadata"], damaged(lie))
         self.assertIn("replay", self.failed("out", "--replay", 3))
+
+    def test_the_list_itself(self):
+        """No field of it is changed, left out or put in unnoticed."""
+        import xxhash
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        self.call("export", "out", "--to", "raw", "-o", "exported")
+        for name in ("out/manifest.json", "exported/export.json"):
+            folder, file = name.split("/")
+            path = self.folder / name
+            whole = path.read_text()
+            self.assertEqual(xxhash.xxh3_128_hexdigest(whole[:whole.rindex(',\n  "xxh3"')].encode()), json.loads(whole)["xxh3"])
+            self.assertEqual(self.checks(folder)["list"]["detail"], f"{file} is as it was written")
+            listing = json.loads(whole)
+            def edited(key, value):
+                return json.dumps({**listing, key: value}, indent=2) + "\n"
+            changed = [whole + "\n", whole.replace("  ", " ", 1), whole.replace('"xxh3": "', '"xxh3":  "'), json.dumps(listing),
+                       edited("xxh3", "0" * 32), edited("note", "mine"), edited("nephos_version", "9.9")]
+            if file == "manifest.json":
+                changed += [edited("run_files", listing["run_files"][:-1]), edited("bounds", {}),
+                            edited("frames", [{**frame, "step": frame["step"] + 1} for frame in listing["frames"]])]
+            for text in changed:
+                self.assertNotEqual(text, whole)
+                path.write_text(text)
+                self.assertIn("list", self.failed(folder), text[-200:])
+            path.write_text(unsealed(listing))
+            self.assertEqual(self.checks(folder)["list"]["detail"], f"{file}, of an earlier version, has no checksum")
 
     def test_impossible_numbers_and_paths_of_a_manifest(self):
         self.call("run", self.scene, "--no-render", "--out", "whole")
@@ -135,7 +161,7 @@ class Verify(Case):
         def refused(change, says):
             manifest = json.loads(json.dumps(whole))
             change(manifest)
-            (self.folder / "whole/manifest.json").write_text(json.dumps(manifest))
+            (self.folder / "whole/manifest.json").write_text(unsealed(manifest))
             self.assertIn(says, self.call("verify", "whole", status=3).stderr)
         for number in (2147483647, -2147483648, 10**18, 2**64 - 1, 1e300, 1.5):
             refused(lambda m: m["range"].update(last_frame=number), f"whole/manifest.json: the frame's number {number}"[:60])
@@ -244,7 +270,7 @@ class Replay(Case):
         path = self.folder / "changed/manifest.json"
         manifest = json.loads(path.read_text())
         manifest["frames"][0]["state_hash"] = "0" * 32
-        path.write_text(json.dumps(manifest))
+        path.write_text(unsealed(manifest))
         self.assertIn("frame 1: state", self.call("verify", "changed", "--replay", 1, status=1).stdout)
         self.state("in/state.vdb", 5)
         for folder in ("relative", "full", "absolute"):
@@ -265,7 +291,7 @@ class Replay(Case):
         manifest = json.loads(path.read_text())
         self.assertEqual(manifest["inputs"]["lattice.initial_state"]["path"], "../state.vdb")
         del manifest["inputs"]
-        path.write_text(json.dumps(manifest))
+        path.write_text(unsealed(manifest))
         self.replay("out")
         self.state("state.vdb", 5)
         self.assertIn("earlier version", self.replay("out", status=3)[0])
@@ -286,7 +312,7 @@ class Replay(Case):
         def rewritten(change):
             other = json.loads(json.dumps(manifest))
             change(other)
-            (self.folder / "branch/manifest.json").write_text(json.dumps(other))
+            (self.folder / "branch/manifest.json").write_text(unsealed(other))
         # A manifest of an earlier version has the checkpoint's name alone.
         rewritten(lambda m: m.update(branch={"checkpoint": "source/checkpoint.nephos"}))
         self.replay("branch")

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The simulation of a run done anew by `nephos verify --replay`. Private to the module.
+
+#include "simulation/run_listing.h"
+#include "simulation/verify.h"
+
+namespace nephos {
+
+// Simulates `count` frames of the run from its first on, and compares their states and voxels with those of the manifest.
+// What the scene starts from must be as it was; otherwise the check is not done, and says why.
+Check replay_frames(const RunListing& run, int count);
+
+}  // namespace nephos
