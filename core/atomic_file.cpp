@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
 #include <random>
 #include <string>
 #include <system_error>
@@ -227,6 +228,19 @@ void write_atomically(const std::filesystem::path& path, std::string_view conten
 
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> content) {
     write_atomically(path, std::string_view(reinterpret_cast<const char*>(content.data()), content.size()));
+}
+
+bool separate_from_links(const std::filesystem::path& path) {
+    struct stat status {};
+    if (::lstat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode) || status.st_nlink < 2) return false;
+    std::ifstream stream = open_stream(path);
+    write_pieces_atomically(path, [&](const AppendPiece& append) {
+        std::string piece(std::size_t(1) << 20, '\0');
+        while (stream.read(piece.data(), std::streamsize(piece.size())) || stream.gcount() > 0)
+            append(std::string_view(piece).substr(0, std::size_t(stream.gcount())));
+        check_reading(stream, path);
+    });
+    return true;
 }
 
 std::string published_name(std::string_view temporary) {

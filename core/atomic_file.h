@@ -69,6 +69,11 @@ using AppendPiece = std::function<void(std::string_view piece)>;
 void write_pieces_atomically(const std::filesystem::path& path,
                              const std::function<void(const AppendPiece& append)>& fill);
 
+// Gives a file that has other names as well (hard links, as `cp -l` makes them) its content once more under this name alone, so
+// that what is written into it or cut leaves theirs as it is. Returns whether it had; links to it (symbolic ones) are not
+// followed, and nothing happens where there is no file. Errors as above.
+bool separate_from_links(const std::filesystem::path& path);
+
 // Returns the final name of a temporary file of the functions above ("cloud.vdb" for
 // ".cloud.part123-456.vdb"), or "" for any other name. A killed process leaves such files behind.
 std::string published_name(std::string_view temporary);

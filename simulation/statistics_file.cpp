@@ -116,6 +116,7 @@ StatisticsFile StatisticsFile::create(const std::filesystem::path& path, std::st
 
 StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::uint64_t steps,
                                       const StatisticsVisitor& visit, std::string_view header) {
+    separate_from_links(path);  // a copy of the run may be made of them
     Descriptor file = open_regular_file(path, O_WRONLY | O_APPEND | O_NOFOLLOW);
     const std::uint64_t size = read_statistics(path, steps, visit, header, kStartAnew);
     if (!is_same_file(file.get(), path))  // what is cut is what was read

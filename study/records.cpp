@@ -16,6 +16,7 @@
 #include <sys/file.h>
 
 #include "automaton/checkpoint.h"
+#include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/paths.h"
@@ -416,6 +417,12 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
     files_->series = open_regular_file(series_path_, kOwn);
     lock(path_, files_->records);
     require_own_records(path_);
+    // A copy of the sweep may be made of links. Whoever holds the lock has no other writer.
+    if (separate_from_links(path_)) {
+        files_->records = open_regular_file(path_, kOwn);
+        lock(path_, files_->records);
+    }
+    if (separate_from_links(series_path_)) files_->series = open_regular_file(series_path_, kOwn);
     Records records;
     records.folders_ = 1;
     const auto [bytes, series] = records.read_shard(path_, RecordsFor::running);

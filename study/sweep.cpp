@@ -29,6 +29,7 @@ constexpr std::size_t kNamedFailures = 5;
 
 // Before the runs: what stands in its place is refused at once.
 Descriptor open_timing(const std::filesystem::path& path) {
+    separate_from_links(path);
     return open_regular_file(path, O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW);
 }
 

@@ -202,6 +202,8 @@ Axis parse_axis(const std::string& text) {
         if (std::ranges::count(axis.values, "") > 0) fail("has an empty value");
         return axis;
     }
+    if (rest.substr(dots).starts_with("..."))
+        fail("has three dots, which may be one of either number: write 0.1 and not .1");
     const std::size_t colon = rest.find(':', dots);
     axis.from = parse_number(rest.substr(0, dots), text);
     axis.to = parse_number(rest.substr(dots + 2, colon == rest.npos ? colon : colon - dots - 2), text);

@@ -182,7 +182,7 @@ TEST(Axis, IsReadFromTheCommandLine) {
     EXPECT_EQ(range.keys, (std::vector<std::string>{"a", "b[0].c"}));
     EXPECT_TRUE(range.values.empty() && range.scale == Scale::log && range.from == 0.001 && range.to == 1);
     for (const char* bad : {"a", "=1", "a=1, ,2", "a=1..", "a=..", "a=1..x", "a=2..1", "a=1,,2", "a=1..2:1",
-                            "a=1..2:2.5", "a=log:3"})
+                            "a=1..2:2.5", "a=log:3", "a=0...1:3", "a=.5...7"})
         EXPECT_THROW(parse_axis(bad), Error) << bad;
 }
 

@@ -93,6 +93,21 @@ class Files(Case):
         self.call("run", self.scene, "--no-render", "--out", "third", "--overwrite")
         self.assertEqual((self.folder / "mine").read_text(), "mine")
 
+    def test_a_copy_of_a_run_that_is_made_of_links(self):
+        """`cp -l` gives the files of a run a second name each; to go on under one leaves the other as it was."""
+        layered = ["--set", 'layer=[{name="low", veil={form="stratus", base_m=100, top_m=400}}]']
+        for name, more, file in (("plain", [], "statistics.csv"), ("layered", layered, "statistics/low.csv")):
+            begin = [self.scene, "--no-render", *more, "--out", name]
+            self.call("run", *begin, "--set", "time.steps=3")
+            shutil.copytree(self.folder / name, self.folder / f"{name} linked", copy_function=os.link)
+            before = {path: path.read_bytes() for path in (self.folder / f"{name} linked").rglob("*") if path.is_file()}
+            self.call("run", *begin, "--resume")
+            self.assertGreater(len((self.folder / name / file).read_bytes()), len((self.folder / f"{name} linked" / file).read_bytes()))
+            for path, content in before.items():
+                self.assertEqual(path.read_bytes(), content, path)
+            for folder in (name, f"{name} linked"):
+                self.call("verify", folder)
+
     def test_a_foreign_manifest(self):
         for text in ("", "{}", "[1, 2]", "mine", '{"format": "nephos run", "format_version": 999}'):
             self.write("out/manifest.json", text)

@@ -851,6 +851,18 @@ sd = 0.05
         self.call("report", "out", "--out", "page.html")
         self.assertIn("</html>", (self.folder / "page.html").read_text())
 
+    def test_a_copy_of_a_sweep_that_is_made_of_links(self):
+        """`cp -l` gives its files a second name each; to grow it under one leaves the other as it was."""
+        self.sweep("out")
+        shutil.copytree(self.folder / "out", self.folder / "linked", copy_function=os.link)
+        before = {path: path.read_bytes() for path in (self.folder / "linked").rglob("*") if path.is_file()}
+        self.sweep("out", axis="field.background.ext=0.05,0.1,0.2,0.4")
+        self.sweep("undisturbed", axis="field.background.ext=0.05,0.1,0.2,0.4")
+        self.assertEqual(self.tables("undisturbed"), self.tables("out"))
+        for path, content in before.items():
+            self.assertEqual(path.read_bytes(), content, path)
+        self.assertIn("9 runs", self.sweep("linked").stderr)
+
     def test_links_and_pipes_in_the_folder_are_not_followed(self):
         victim = self.folder / "victim.txt"
         for name in ("shards/0000-of-0001.series", "shards/0000-of-0001.jsonl", "shards/lock", "timing.csv"):
