@@ -107,9 +107,10 @@ class PieceWriter {
 
 }  // namespace
 
-AtomicFile::AtomicFile(const std::filesystem::path& given, Access access) : path_(target_of(given)) {
+AtomicFile::AtomicFile(const std::filesystem::path& given, Access access, Folders folders)
+    : path_(target_of(given)) {
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
-    create_folders(folder);
+    if (folders == Folders::made) create_folders(folder);
     create_temporary(folder, access);
 }
 
@@ -208,8 +209,8 @@ void write_atomically(const std::filesystem::path& path,
 }
 
 void write_pieces_atomically(const std::filesystem::path& path,
-                             const std::function<void(const AppendPiece& append)>& fill) {
-    AtomicFile file(path);
+                             const std::function<void(const AppendPiece& append)>& fill, Folders folders) {
+    AtomicFile file(path, Access::shared, folders);
     Descriptor descriptor(::open(file.temporary().c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC));
     if (descriptor.get() < 0) fail(path, "cannot open", errno);
     PieceWriter writer(descriptor.get());

@@ -23,14 +23,21 @@ enum class Access {
     owner,   // this user alone
 };
 
+// What becomes of folders on the way to the file that are missing.
+enum class Folders {
+    made,
+    expected,  // an error: their owner has moved or removed them
+};
+
 // A file that is written under a temporary name until it is complete. write_atomically() and the functions below it use
 // one.
 class AtomicFile {
   public:
-    // Creates an empty temporary file whose name nobody can foresee beside `path`, and missing parent folders. Symbolic
+    // Creates an empty temporary file whose name nobody can foresee beside `path`. Symbolic
     // links of this user or of root keep pointing to the new file, also where it is not there yet; one of another user, a
     // device, a pipe or a folder in the place of the file is refused. Throws Error(io) naming `path`.
-    explicit AtomicFile(const std::filesystem::path& path, Access access = Access::shared);
+    explicit AtomicFile(const std::filesystem::path& path, Access access = Access::shared,
+                        Folders folders = Folders::made);
     // Removes the temporary file unless it was published, unless another was put in its place.
     ~AtomicFile();
     AtomicFile(const AtomicFile&) = delete;
@@ -67,7 +74,8 @@ void write_atomically(const std::filesystem::path& path, std::string_view conten
 // Errors as above.
 using AppendPiece = std::function<void(std::string_view piece)>;
 void write_pieces_atomically(const std::filesystem::path& path,
-                             const std::function<void(const AppendPiece& append)>& fill);
+                             const std::function<void(const AppendPiece& append)>& fill,
+                             Folders folders = Folders::made);
 
 // Gives a file that has other names as well (hard links, as `cp -l` makes them) its content once more under this name alone, so
 // that what is written into it or cut leaves theirs as it is. Returns whether it had; links to it (symbolic ones) are not

@@ -181,9 +181,15 @@ Simulation branched_simulation(const RunSettings& settings, const RunFolder& fol
     }
 }
 
-void begin_branch_folder(const RunSettings& settings, const RunFolder& folder, std::uint64_t steps) {
+void require_tables_of_other_run(const RunSettings& settings, std::uint64_t steps) {
     const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
-    remove_earlier_run(folder);
+    read_statistics(parent.statistics(), steps, {}, kStatisticsHeader);
+    for (const LayerOptions& layer : settings.scene.layers)
+        read_statistics(parent.statistics(layer.name), steps, {}, kLayerStatisticsHeader);
+}
+
+void copy_tables_of_other_run(const RunSettings& settings, const RunFolder& folder, std::uint64_t steps) {
+    const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
     copy_statistics(parent.statistics(), folder.statistics(), steps, kStatisticsHeader);
     for (const LayerOptions& layer : settings.scene.layers)
         copy_statistics(parent.statistics(layer.name), folder.statistics(layer.name), steps,

@@ -38,8 +38,9 @@ std::string scene_text_beside(const std::filesystem::path& from);
 // the other run.
 Simulation branched_simulation(const RunSettings& settings, const RunFolder& folder);
 
-// Begins the folder of a branch: removes an earlier run, and copies the rows of all steps before `steps` from the statistics
-// of the other run. Throws Error(io).
-void begin_branch_folder(const RunSettings& settings, const RunFolder& folder, std::uint64_t steps);
+// Throws Error(io) unless the other run's statistics, of all layers too, have the rows of all steps before `steps`.
+void require_tables_of_other_run(const RunSettings& settings, std::uint64_t steps);
+// Copies these rows into the folder of the branch. Throws Error(io).
+void copy_tables_of_other_run(const RunSettings& settings, const RunFolder& folder, std::uint64_t steps);
 
 }  // namespace nephos

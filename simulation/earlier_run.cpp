@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <system_error>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -13,6 +15,7 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/file_stamp.h"
 #include "scenes/format/writer.h"
 #include "simulation/manifest.h"
 #include "simulation/statistics_file.h"
@@ -61,27 +64,50 @@ std::vector<std::string> frame_parts(const RunFolder& folder) {
     return parts;
 }
 
-// Lists the files of a run of this name that are there already, the manifest last: as long as it is there, the rest
-// is known to be of a run.
+// Returns whether something is there, links not followed. Throws ReadFailure where the system cannot say.
+bool is_in_place(const std::filesystem::path& path) {
+    std::error_code error;
+    const auto type = std::filesystem::symlink_status(path, error).type();
+    if (type == std::filesystem::file_type::none) throw ReadFailure(path, error.message(), "examine");
+    return type != std::filesystem::file_type::not_found;
+}
+
+// Returns the name of the scene of the run that is in the folder; empty where none tells it.
+std::string earlier_name(const RunFolder& folder) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(folder.manifest(), error)) return {};
+    try {
+        const std::string name = read_manifest(folder.manifest()).name;
+        return std::filesystem::path(name).filename() == name ? name : "";  // leads nowhere else
+    } catch (const ReadFailure&) {
+        throw;
+    } catch (const Error&) {
+        return {};
+    }
+}
+
+// Lists the files of a run of this name, and of the one in the folder, that are there already, the manifest last: as long as
+// it is there, the rest is known to be of a run.
 std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     std::vector<std::filesystem::path> files;
+    std::vector<std::string> names{folder.name};
+    if (const std::string earlier = earlier_name(folder); !earlier.empty() && earlier != folder.name)
+        names.push_back(earlier);
     for (const std::string& part : frame_parts(folder)) {
-        for (const std::string& name : names_in(folder, part)) {
-            if (is_frame_of(name, folder.name)) files.push_back(folder.folder / part / name);
+        for (const std::string& file : names_in(folder, part)) {
+            if (std::ranges::any_of(names, [&](const std::string& name) { return is_frame_of(file, name); }))
+                files.push_back(folder.folder / part / file);
         }
     }
     for (const std::string& name : names_in(folder, "statistics")) {
         const std::filesystem::path path = folder.folder / "statistics" / name;
         if (is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
     }
-    for (const std::filesystem::path& path :
-         {folder.checkpoint(), folder.statistics(), folder.video(), folder.manifest()}) {
-        std::error_code error;
-        const auto type = std::filesystem::symlink_status(path, error).type();
-        if (type == std::filesystem::file_type::none)
-            throw Error(ErrorCode::io, path.string() + ": cannot examine: " + error.message());
-        if (type != std::filesystem::file_type::not_found) files.push_back(path);
-    }
+    std::vector<std::filesystem::path> others{folder.checkpoint(), folder.statistics()};
+    for (const std::string& name : names) others.push_back(RunFolder{folder.folder, name}.video());
+    others.push_back(folder.manifest());
+    for (const std::filesystem::path& path : others)
+        if (is_in_place(path)) files.push_back(path);
     return files;
 }
 
@@ -227,8 +253,33 @@ void remove_leftovers(const RunFolder& folder) {
     for (const std::string& part : frame_parts(folder)) remove_if(part, is_frame);
 }
 
-void refuse_to_lose(const RunFolder& folder, const RunSettings& settings,
-                    const std::vector<RunInput>& inputs) {
+void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs) {
+    std::map<std::pair<std::uint64_t, std::uint64_t>, const RunInput*> begins_with;
+    for (const RunInput& input : inputs) {
+        const FileStamp stamp = file_stamp(path_of(folder.folder, input.path));
+        if (stamp.inode != 0) begins_with[{stamp.device, stamp.inode}] = &input;
+    }
+    if (begins_with.empty()) return;
+    for (const std::filesystem::path& file : earlier_files(folder)) {
+        const FileStamp stamp = file_stamp(file);
+        const auto found = begins_with.find({stamp.device, stamp.inode});
+        if (found == begins_with.end()) continue;
+        throw Error(ErrorCode::usage, fmt::format("{}: is what `{}` names, and a file of the run in {}, "
+                                                  "which is replaced: choose another --out",
+                                                  file.string(), found->second->key, folder.folder.string()));
+    }
+}
+
+void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
+                    Resumption found) {
+    for (const LayerOptions& layer : settings.scene.layers) {
+        const std::filesystem::path table = folder.statistics(layer.name);
+        if (!is_in_place(table) || is_statistics(table, kLayerStatisticsHeader) ||
+            is_begun_statistics(table, kLayerStatisticsHeader))
+            continue;
+        refuse(folder, fmt::format("the folder holds a {} that is not of a run",
+                                   table.lexically_relative(folder.folder).string()));
+    }
     const std::vector<std::filesystem::path> files = earlier_files(folder);
     if (files.empty()) return;
     if (files.back() != folder.manifest()) {
@@ -251,7 +302,9 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings,
         !is_begun_statistics(folder.statistics())) {
         refuse(folder, "the folder holds a statistics.csv that is not of a run");
     }
-    if (earlier.scene_hash != settings.scene_hash) {
+    if (found == Resumption::start_anew) {
+        scene_before(earlier, settings, folder);  // which may have fewer steps
+    } else if (earlier.scene_hash != settings.scene_hash) {
         refuse(folder, fmt::format("it holds a run of '{}' with another scene or seed ({})", earlier.name,
                                    changed_keys(earlier, settings)));
     }

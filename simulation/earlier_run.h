@@ -14,19 +14,13 @@
 
 namespace nephos {
 
-// Removes an earlier run's files of the same name, which must not stay between those of a new one; nothing else is
-// touched. Throws Error(io).
+// Removes an earlier run's files, which must not stay between those of a new one: those of the same name, and of the name that
+// its manifest has; nothing else is touched. Throws Error(io).
 void remove_earlier_run(const RunFolder& folder);
 
 // Removes the temporary files of a run that was killed. Only for the holder of the folder's lock: to nobody else
 // are they leftovers. Throws Error(io).
 void remove_leftovers(const RunFolder& folder);
-
-// Throws Error(usage) when a new run would overwrite something that it cannot make again: an interrupted run,
-// which may hold hours of work, a run of another scene, or a file that no run wrote.
-// `inputs`: the files that the scene names, as they are now.
-void refuse_to_lose(const RunFolder& folder, const RunSettings& settings,
-                    const std::vector<RunInput>& inputs);
 
 // What `--resume` finds in a folder.
 enum class Resumption {
@@ -35,6 +29,18 @@ enum class Resumption {
     go_on,     // a checkpoint
     complete,  // the same run, complete and without a checkpoint: there is nothing to do
 };
+
+// Throws Error(usage) when a new run would overwrite something that it cannot make again: an interrupted run,
+// which may hold hours of work, a run of another scene, or a file that no run wrote.
+// `inputs`: the files that the scene names, as they are now. `found`: what --resume found, or nothing_there: then a run of the
+// same scene with fewer steps is another one.
+void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
+                    Resumption found);
+
+// Throws Error(usage) when a run that begins would remove one of the files that it begins with, as a frame of the run that
+// is in the folder.
+void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs);
+
 // Throws Error(usage) when the folder holds a run of another scene, Error(io) when its manifest cannot be read.
 Resumption find_resumption(const RunSettings& settings, const RunFolder& folder);
 

@@ -295,29 +295,33 @@ FileRecord file_record(const Json& json, const std::filesystem::path& manifest) 
 
 void write_manifest(const RunSettings& settings, const ManifestState& state) {
     const RunFolder folder{settings.folder, settings.scene.name};
-    write_pieces_atomically(folder.manifest(), [&](const AppendPiece& append_to_file) {
-        Digest digest;
-        const auto append = [&](std::string_view piece) {
-            digest.add(piece);
-            append_to_file(piece);
-        };
-        append("{\n" + members(head_json(settings, state)) + ",\n  \"frames\": [");
-        std::string_view separator = "\n";
-        for (const FrameRecord& frame : state.frames) {
-            append(separator);
-            append("    " + frame_json(settings, frame, state, folder)
-                                .dump(-1, ' ', false, Json::error_handler_t::replace));
-            separator = ",\n";
-        }
-        Json tail = Json::object();
-        if (!state.run_files.empty()) tail["run_files"] = files_json(state.run_files);
-        tail.update(Json{
-            {"scene_text", settings.scene_text},
-            {"scene_given", given_toml(settings.scene)},
-            {"timing", {{"wall_s", state.wall_s}, {"backend", state.backend}, {"device", state.device}}}});
-        append("\n  ],\n" + members(tail));
-        append_to_file(seal_text(digest));
-    });
+    write_pieces_atomically(
+        folder.manifest(),
+        [&](const AppendPiece& append_to_file) {
+            Digest digest;
+            const auto append = [&](std::string_view piece) {
+                digest.add(piece);
+                append_to_file(piece);
+            };
+            append("{\n" + members(head_json(settings, state)) + ",\n  \"frames\": [");
+            std::string_view separator = "\n";
+            for (const FrameRecord& frame : state.frames) {
+                append(separator);
+                append("    " + frame_json(settings, frame, state, folder)
+                                    .dump(-1, ' ', false, Json::error_handler_t::replace));
+                separator = ",\n";
+            }
+            Json tail = Json::object();
+            if (!state.run_files.empty()) tail["run_files"] = files_json(state.run_files);
+            tail.update(
+                Json{{"scene_text", settings.scene_text},
+                     {"scene_given", given_toml(settings.scene)},
+                     {"timing",
+                      {{"wall_s", state.wall_s}, {"backend", state.backend}, {"device", state.device}}}});
+            append("\n  ],\n" + members(tail));
+            append_to_file(seal_text(digest));
+        },
+        Folders::expected);
 }
 
 std::vector<RainRecord> rain_of(const FrameResult& frame) {

@@ -231,15 +231,15 @@ void check_memory(const Scene& scene, const AvailableMemory& available, RunParts
     if (!scene.automaton.wind.fields.empty()) estimate = memory_estimate(with_files(scene), parts);
     if (estimate.total() <= available.bytes) return;
     const Extent& extent = scene.automaton.extent;
-    const auto text = [](int number) { return std::to_string(number); };
+    const std::string cells = scene.layers.empty()
+                                  ? fmt::format("{} x {} x {} cells", extent.x, extent.y, extent.z)
+                                  : fmt::format("the lattices of {} layers", scene.layers.size());
     throw Error(ErrorCode::usage, "the scene needs about " + bytes_text(estimate.total()) +
                                       " of memory (automaton " + bytes_text(estimate.automaton) +
                                       ", density " + bytes_text(estimate.density) + ", pictures " +
-                                      bytes_text(estimate.pictures) + ") for " + text(extent.x) + " x " +
-                                      text(extent.y) + " x " + text(extent.z) + " cells" +
-                                      (scene.layers.empty() ? "" : " and the lattices of its layers") +
-                                      ", but the " + available.limit + " leaves " +
-                                      bytes_text(available.bytes) + ": expected " + advice(estimate));
+                                      bytes_text(estimate.pictures) + ") for " + cells + ", but the " +
+                                      available.limit + " leaves " + bytes_text(available.bytes) +
+                                      ": expected " + advice(estimate));
 }
 
 void check_memory(const Scene& scene, RunParts parts) { check_memory(scene, available_memory(), parts); }

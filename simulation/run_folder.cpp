@@ -78,8 +78,13 @@ class Recorder : public SimulationSink {
         }
     }
 
-    // Goes on from the statistics of the run that this one branches off, with frames of its own.
+    // Goes on from the statistics of the run that this one branches off, with frames of its own. The manifest is there before
+    // the first of them: without it they would be nobody's, should this fail.
     void begin_branch(const Simulation& simulation) {
+        require_tables_of_other_run(settings_, simulation.next_step());
+        remove_earlier_run(folder_);
+        write_manifest(false, 0);
+        copy_tables_of_other_run(settings_, folder_, simulation.next_step());
         statistics_ = StatisticsFile::resume(
             folder_.statistics(), simulation.next_step(),
             [this](std::uint64_t, std::string_view, const StateHash& hash) { state_.state_hash = hash.hex(); });
@@ -426,17 +431,23 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
                       settings.range.last_frame >= settings.range.first_frame;
     const RunFolder folder{settings.folder, settings.scene.name};
     if (settings.render && wants_video(settings.scene)) require_ffmpeg();
-    const Resumption resumption =
-        settings.resume ? find_resumption(settings, folder) : Resumption::nothing_there;
-    if (resumption == Resumption::complete) return report_of_complete(settings, folder);
-    settings.resume = resumption == Resumption::go_on;
+    const bool may_resume = settings.resume;
+    const auto found = [&] {
+        return may_resume ? find_resumption(settings, folder) : Resumption::nothing_there;
+    };
+    if (found() == Resumption::complete) return report_of_complete(settings, folder);
     std::optional<Simulation> made;  // outlives the recorder, whose threads draw what is in it
     Recorder recorder(settings);     // opens the device
 
     const FolderLock lock(folder.folder, "run");
+    const Resumption resumption = found();  // once more: another run may have been at work until now
+    if (resumption == Resumption::complete) return report_of_complete(settings, folder);
+    settings.resume = resumption == Resumption::go_on;
     std::vector<RunInput> inputs = inputs_of(settings);
-    if (resumption == Resumption::nothing_there && !settings.overwrite)
-        refuse_to_lose(folder, settings, inputs);
+    if (!settings.resume) {
+        refuse_to_remove_inputs(folder, inputs);
+        if (!settings.overwrite) refuse_to_lose(folder, settings, inputs, resumption);
+    }
     if (lock.held()) remove_leftovers(folder);
     Simulation& simulation =
         made.emplace(settings.resume   ? resumed_simulation(settings, folder, inputs)
@@ -453,7 +464,6 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         recorder.take_over(simulation);
         if (!simulation.finished()) recorder.write_manifest(false, seconds_since(begin));
     } else if (settings.branch) {
-        begin_branch_folder(settings, folder, simulation.next_step());
         recorder.begin_branch(simulation);
     } else {
         remove_earlier_run(folder);

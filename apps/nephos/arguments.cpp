@@ -11,6 +11,7 @@
 
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/warnings.h"
 
@@ -198,6 +199,13 @@ void refuse_to_replace(const std::string& from, const std::string& to) {
     if (!from.empty() && !to.empty() && std::filesystem::equivalent(from, to, error))
         throw Error(ErrorCode::usage,
                     to + ": is the file that is read: expected the name of another one to write");
+}
+
+void refuse_to_replace_files_of(Scene scene, const std::string& to) {
+    for_each_file(scene, [&](const std::string&, FileKind, const std::filesystem::path& file) {
+        refuse_to_replace(file.string(), to);
+        return file;
+    });
 }
 
 void print_scene_errors(const SceneErrors& errors) {

@@ -81,6 +81,8 @@ Scene load_scene(const SceneArguments& arguments, SceneUse use = SceneUse::every
 
 // Throws Error(usage) when the file to write is one that is read; either may be empty.
 void refuse_to_replace(const std::string& from, const std::string& to);
+// The same for each file that a scene names.
+void refuse_to_replace_files_of(Scene scene, const std::string& to);
 
 // Prints every problem on standard error, "error:" in colour on a terminal.
 void print_scene_errors(const SceneErrors& errors);

@@ -183,6 +183,10 @@ int render(const RenderArguments& a) {
     const ThreadLimit limit(a.work.threads);
     std::optional<Scene> scene;
     if (!a.scene.file.empty()) scene = load_scene(a.scene);
+    for (const std::string& out : a.out) {
+        refuse_to_replace(a.scene.file, out);
+        if (scene) refuse_to_replace_files_of(*scene, out);
+    }
     const LoadedDensity loaded = load_density(a.file, a.read);
     constexpr double kLargestCell_m = 1e9;  // as of --scale; rays take a time that grows with it
     if (const double cell_m = loaded.density.placement().cell_size_m; cell_m > kLargestCell_m)

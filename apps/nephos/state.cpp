@@ -54,11 +54,7 @@ int state(const StateArguments& a) {
     const Scene scene = load_scene(a.scene, SceneUse::without_frames);
     refuse_to_replace(a.scene.file, a.out);
     refuse_to_replace(a.from, a.out);
-    Scene named = scene;
-    for_each_file(named, [&](const std::string&, FileKind, const std::filesystem::path& file) {
-        refuse_to_replace(file.string(), a.out);
-        return file;
-    });
+    refuse_to_replace_files_of(scene, a.out);
     std::vector<LayerSimulation> layers = start_layers(scene, a.scene.file, a.from);
     const Automaton& automaton = *layers[chosen_layer(a, layers)].automaton();
     const std::uint64_t steps = a.steps.value_or(scene.steps);

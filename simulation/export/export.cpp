@@ -202,6 +202,21 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
     }
 }
 
+// Throws Error(usage) where a source lies in the folder of the export: a file of its name would replace it.
+void refuse_own_folder(const ExportOptions& options, const std::vector<ExportSequence>& sequences) {
+    for (const ExportSequence& s : sequences) {
+        for (const SourceFrame& frame : s.frames) {
+            std::error_code error;
+            const std::filesystem::path folder =
+                frame.file.has_parent_path() ? frame.file.parent_path() : ".";
+            if (std::filesystem::equivalent(folder, options.folder, error))
+                throw Error(ErrorCode::usage, frame.file.string() +
+                                                  ": lies in the folder that is written to: expected "
+                                                  "another one as --out");
+        }
+    }
+}
+
 void write_texts(const ExportOptions& options, const std::vector<ExportSequence>& sequences,
                  const std::vector<std::vector<FrameFigures>>& figures, ExportList& list,
                  std::vector<std::string>& notes) {
@@ -263,14 +278,15 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 fmt::format("{}: its largest value is {:g}, and --range auto takes values from {:g} to {:g}",
                             s.frames.front().file.string(), s.scale, kLeastScale, kLargestScale));
     }
+    refuse_own_folder(options, sequences);
     const FolderLock lock(options.folder, "export");
     ExportList list(options, sequences);
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());
     const auto take = [&](const ExportSequence& s, std::vector<FrameFigures>& of, ExportedFrame&& frame) {
         if (!frame.note.empty()) notes.push_back(std::move(frame.note));
-        for (ExportedFile& file : frame.kept) list.add_kept(std::move(file));
-        for (ExportedFile& file : frame.written) list.add_written(std::move(file));
+        for (ExportedFrame::File& file : frame.files)
+            file.kept ? list.add_kept(std::move(file.listed)) : list.add_written(std::move(file.listed));
         if (frame.figures.max > s.scale && cuts_values(options))
             notes.push_back(
                 fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "

@@ -110,7 +110,7 @@ std::string prim_name(const std::string& name) {
 }  // namespace
 
 std::string sidecar_text(const ExportOptions& options, const ExportSequence& s,
-                         const std::vector<FrameFigures>& figures) {
+                         const std::vector<FrameFigures>& figures, SidecarUse use) {
     const VolumeBox box = box_of(s.extent, s.placement, s.layout);
     const VdbMetadata& m = s.metadata;
     Json formats = Json::array();
@@ -127,8 +127,12 @@ std::string sidecar_text(const ExportOptions& options, const ExportSequence& s,
     }
     Json json = {{"format", "nephos volume"}, {"format_version", 1}, {"name", s.name}};
     if (!s.layer.empty()) json["layer"] = s.layer;
-    json["first"] = s.frames.front().number;
-    json["count"] = s.frames.size();
+    // Not in a file of a frame, which later exports of more frames keep.
+    const bool tells_frames = use == SidecarUse::file;
+    if (tells_frames) {
+        json["first"] = s.frames.front().number;
+        json["count"] = s.frames.size();
+    }
     json["quantity"] = "density";
     json["scale"] = s.scale;
     json["offset"] = 0;
@@ -147,10 +151,12 @@ std::string sidecar_text(const ExportOptions& options, const ExportSequence& s,
     json["padding"] = box.padding;
     if (options.half_voxel_shift) json["half_voxel_shift"] = true;
     json["formats"] = formats;
-    json["time"] = {{"first_s", s.frames.front().time_s},
-                    {"frames_per_second", s.frames_per_second},
-                    {"time_scale", m.time_scale}};
-    json["wind"] = wind_json(s.wind);
+    if (tells_frames) {
+        json["time"] = {{"first_s", s.frames.front().time_s},
+                        {"frames_per_second", s.frames_per_second},
+                        {"time_scale", m.time_scale}};
+        json["wind"] = wind_json(s.wind);
+    }
     if (m.georeference.given) json["georeference"] = georeference_json(m.georeference);
     Json frames = Json::array();
     for (std::size_t n = 0; n < figures.size(); ++n) {

@@ -135,7 +135,7 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
     require_unchanged(frame);
     std::map<VoxelType, EncodedVolume> encoded;
     std::vector<Volume> levels;
-    ExportedFrame result{{loaded.density.sum(), double(loaded.density.max_value())}, {}, {}, {}};
+    ExportedFrame result{{loaded.density.sum(), double(loaded.density.max_value())}, {}, {}};
     if (frame.listed && frame.listed != source.digest)
         result.note = frame.file.string() +
                       ": is damaged or was changed: it is not the file that the manifest of its run "
@@ -144,7 +144,7 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
         if (format == ExportFormat::usd) continue;
         const std::string name = frame_name(s, frame.number, format);
         if (std::optional<ExportedFile> kept = list_.kept_file(name, source)) {
-            result.kept.push_back(std::move(*kept));
+            result.files.push_back({std::move(*kept), true});
             continue;
         }
         const std::filesystem::path path = options_.folder / name;
@@ -178,7 +178,7 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
             !(file.digest == source.digest))
             throw Error(ErrorCode::io,
                         frame.file.string() + ": was changed while it was exported: export it again");
-        result.written.push_back(std::move(file));
+        result.files.push_back({std::move(file), false});
     }
     return result;
 }
@@ -193,7 +193,7 @@ void FrameExporter::write_dense(const std::filesystem::path& path, ExportFormat 
         case ExportFormat::dds:
             return write_dds(path, encoded, options_.legacy_dds);
         case ExportFormat::ktx2:
-            return write_ktx2(path, encoded, sidecar_text(options_, s, {}));
+            return write_ktx2(path, encoded, sidecar_text(options_, s, {}, SidecarUse::in_frame));
         case ExportFormat::slices:
             return write_slices(path, encoded, slice_columns(box.size[0], box.size[1], box.size[2]));
         default: {

@@ -19,7 +19,11 @@ namespace nephos {
 // What came of a frame.
 struct ExportedFrame {
     FrameFigures figures;
-    std::vector<ExportedFile> written, kept;
+    struct File {
+        ExportedFile listed;
+        bool kept;  // an earlier export wrote it
+    };
+    std::vector<File> files;  // in the order of formats
     std::string note;  // on its source; empty: none
 };
 

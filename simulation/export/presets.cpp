@@ -158,7 +158,8 @@ constexpr const char* kVulkan =
     "Vulkan, Direct3D and other engines that load KTX 2\n\n"
     "Upload {FIRST} as a 3-D image with all levels (libktx, or the 100 lines of the specification). The key "
     "`nephos` of each\n"
-    "file is the sidecar's text. Address mode clamp to edge: the border is 0. Value = texel * {SCALE}; "
+    "file is the sidecar's text, but for what is of frames, times and wind. Address mode clamp to edge: the "
+    "border is 0. Value = texel * {SCALE}; "
     "extinction per metre\n"
     "= value * {EXTINCTION}. World place: min_m .. max_m of the sidecar.\n";
 

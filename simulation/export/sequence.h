@@ -82,9 +82,14 @@ struct FrameFigures {
     double sum = 0, max = 0;
 };
 
+enum class SidecarUse {
+    file,      // NAME.volume.json
+    in_frame,  // in the file of each frame: nothing that depends on how many there are, or when they are
+};
+
 // Return the text of the sidecar, of the USD scene of all sequences, and of the README of the options' preset.
 std::string sidecar_text(const ExportOptions& options, const ExportSequence& sequence,
-                         const std::vector<FrameFigures>& figures);
+                         const std::vector<FrameFigures>& figures, SidecarUse use = SidecarUse::file);
 std::string usd_text(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
 std::string readme_text(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
 

@@ -586,6 +586,20 @@ class Export(Case):
         (folder / "placed_0003.ktx2").write_bytes(content)
         self.assertIn("placed_0003.ktx2", self.call("verify", "out", status=1).stdout)
 
+    def test_frames_that_are_added_leave_the_others_as_they_are(self):
+        self.export("whole", "--to", "ktx2")
+        self.export("grown", "--to", "ktx2", "--frames", "1..2")
+        self.call("export", "run", "--to", "ktx2", "-o", "grown", "-q")
+        for path in (self.folder / "whole").iterdir():
+            self.assertEqual(path.read_bytes(), (self.folder / "grown" / path.name).read_bytes(), path.name)
+        self.call("verify", "grown")
+        # One of several formats is made again: the list is that of one go.
+        self.export("mended", "--to", "raw", "--to", "bricks")
+        whole = json.loads((self.folder / "mended/export.json").read_text())
+        (self.folder / "mended/placed_0002.raw").unlink()
+        self.call("export", "run", "--to", "raw", "--to", "bricks", "-o", "mended", "-q")
+        self.assertEqual(json.loads((self.folder / "mended/export.json").read_text()), whole)
+
     def test_any_fog_volume(self):
         import pyopenvdb
         grid = pyopenvdb.FloatGrid()

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files that are there already, and that a call must not lose: of somebody, of another run, or what it reads itself."""
+
+import json
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import time
+import unittest
+import zlib
+
+from case import Case, NEPHOS, SCENE
+
+LAYERED = """\
+name = "l"
+[time]
+steps = 4
+[frames]
+enabled = false
+[[layer]]
+name = "low"
+lattice = { cells = [16, 16, 4], cell_size_m = 500 }
+veil = { form = "cirrostratus", octaves = 1, wavelength_m = 4000, base_m = 500, top_m = 1500 }
+"""
+
+
+def height_map(height):
+    """A PNG file of 16 x 16 heights."""
+    rows = b"".join(b"\0" + struct.pack(">16H", *(x * height for x in range(16))) for _ in range(16))
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 16, 16, 16, 0, 0, 0, 0)) + \
+        chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+
+
+class Keeping(Case):
+    def setUp(self):
+        super().setUp()
+        self.plain = ("run", self.scene, "--no-render", "-q")
+
+    def files(self, folder):
+        return {path: path.read_bytes() for path in (self.folder / folder).rglob("*") if path.is_file()}
+
+    def kept(self, folder, status, *arguments, says):
+        before = self.files(folder)
+        self.refused(status, *arguments, says=says)
+        self.assertEqual(self.files(folder), before)
+
+    def test_a_foreign_table_of_a_layer(self):
+        scene = self.write("layered.toml", LAYERED)
+        for content in ("mine\n", "step,my\n"):
+            table = self.folder / "out/statistics/low.csv"
+            table.parent.mkdir(parents=True, exist_ok=True)
+            table.write_text(content)
+            for more in ([], ["--resume"]):
+                self.kept("out", 2, "run", scene, "--out", "out", *more, says="holds a statistics/low.csv that is not of a run")
+        table.write_text("")  # of a run that was killed, or of nobody
+        self.call("run", scene, "--out", "out")
+        self.call("verify", "out")
+        table.write_text("mine\n")
+        (self.folder / "out/checkpoint.nephos").unlink()
+        self.kept("out", 2, "run", scene, "--out", "out", "--resume", says="statistics/low.csv")
+
+    def test_resuming_without_a_checkpoint_keeps_what_starting_keeps(self):
+        self.call(*self.plain, "--out", "out")
+        (self.folder / "out/checkpoint.nephos").unlink()
+        shutil.copytree(self.folder / "out", self.folder / "table")
+        (self.folder / "table/statistics.csv").write_text("mine\n")
+        for more in ([], ["--resume"]):
+            self.kept("table", 2, *self.plain, "--out", "table", *more, says="a statistics.csv that is not of a run")
+        self.call("run", self.scene, "--splatting", "cpu", "-q", "--out", "drawn")
+        (self.folder / "drawn/checkpoint.nephos").unlink()
+        for more in ([], ["--resume"]):
+            self.kept("drawn", 2, *self.plain, "--out", "drawn", *more, says="not all of which would be made again")
+        (self.folder / "h.png").write_bytes(height_map(10))
+        high = ("run", self.write("high.toml", 'ground = { height_map = "h.png" }\n' + SCENE),
+                "--splatting", "cpu", "-q", "--out", "high")
+        self.call(*high)
+        (self.folder / "high/checkpoint.nephos").unlink()
+        (self.folder / "h.png").write_bytes(height_map(20))
+        for more in ([], ["--resume"]):
+            self.kept("high", 2, *high, *more, says="another content of h.png of `ground.height_map`")
+        # What loses nothing goes on, also with more steps.
+        self.call(*self.plain, "--out", "out", "--resume", "--set", "time.steps=9")
+        self.call(*self.plain, "--out", "whole", "--set", "time.steps=9")
+        self.same_runs("whole", "out")
+
+    @unittest.skipUnless(shutil.which("strace"), "strace is not installed")
+    def test_a_run_that_ends_while_another_begins(self):
+        """What --resume finds before it has the folder may be another run's work by then."""
+        self.call(*self.plain, "--out", "out")
+        (self.folder / "out/checkpoint.nephos").unlink()
+        late = subprocess.Popen(["strace", "-f", "-qq", "-e", "trace=flock", "-e", "inject=flock:delay_enter=3000000", "-o",
+                                 "/dev/null", NEPHOS, *map(str, self.plain), "--resume", "--out", "out"], cwd=self.folder,
+                                env=self.environment, stderr=subprocess.PIPE, text=True)
+        time.sleep(1)
+        self.call(*self.plain, "--seed", "99", "--overwrite", "--out", "out")
+        _, said = late.communicate(timeout=60)
+        self.assertEqual(late.returncode, 2, said)
+        self.assertEqual(json.loads((self.folder / "out/manifest.json").read_text())["scene"]["seed"], "99")
+        self.call("verify", "out")
+
+    def test_a_branch_that_cannot_begin(self):
+        """An earlier one stays; and one that fails on the way can be made again by the same call."""
+        later = ("--set", "time.steps=12", "--no-render", "-q")
+        self.call(*self.plain, "--out", "source")
+        shutil.copytree(self.folder / "source", self.folder / "damaged")
+        self.call("run", "--from", "damaged", *later, "--out", "branch")
+        (self.folder / "damaged/statistics.csv").unlink()
+        self.kept("branch", 3, "run", "--from", "damaged", self.scene, *later, "--out", "branch", says="damaged/statistics.csv: cannot open")
+        self.call("run", "--from", "source", *later, "--out", "whole")
+        for kilobytes in range(1, 12):
+            shutil.rmtree(self.folder / "small", ignore_errors=True)
+            full = subprocess.run(["bash", "-c", f'ulimit -f {kilobytes}; exec "$0" "$@"', NEPHOS, "run", "--from", "source", *later,
+                                   "--out", "small"], cwd=self.folder, env=self.environment, capture_output=True, text=True)
+            self.assertIn(full.returncode, (0, 3), full.stderr)
+            self.call("run", "--from", "source", *later, "--out", "small", *(["--resume"] if (
+                self.folder / "small/checkpoint.nephos").exists() else []))
+            self.same_runs("whole", "small")
+
+    def test_a_run_of_another_name_is_replaced_as_a_whole(self):
+        self.call(*self.plain, "--out", "out")
+        self.call(*self.plain, "--out", "out", "--set", 'name="other"', "--overwrite")
+        self.assertEqual([p.name for p in sorted((self.folder / "out/density").iterdir())],
+                         [f"other_{n:04}.vdb" for n in range(1, len(list((self.folder / "out/density").iterdir())) + 1)])
+        self.call("verify", "out")
+        # A name that leads elsewhere is none.
+        manifest = self.folder / "out/manifest.json"
+        manifest.write_text(manifest.read_text().replace('"name": "other"', '"name": "../../victim"'))
+        (self.folder / "victim.mp4").write_text("mine")
+        self.call(*self.plain, "--out", "out", "--overwrite")
+        self.assertEqual((self.folder / "victim.mp4").read_text(), "mine")
+
+    def test_files_that_a_call_reads(self):
+        self.call(*self.plain, "--out", "out")
+        frame = self.folder / "out/density/tiny_0003.vdb"
+        shutil.copy(frame, self.folder / "cloud.vdb")
+        (self.folder / "h.png").write_bytes(height_map(10))
+        scene = self.write("high.toml", 'ground = { height_map = "h.png" }\n' + SCENE)
+        for out in ("h.png", "./h.png"):
+            self.kept(".", 2, "render", "cloud.vdb", "--scene", scene, "--out", out, "--splatting", "cpu", says="is the file that is read")
+        self.kept("out", 2, *self.plain, "--out", "out", "--overwrite", "--set", "lattice.initial_state=out/density/tiny_0003.vdb",
+                  says="is what `lattice.initial_state` names, and a file of the run in out, which is replaced")
+        self.call("export", "cloud.vdb", "--for", "blender", "-o", "exported", "-q")
+        name = next(p for p in (self.folder / "exported").iterdir() if p.suffix == ".vdb").name
+        self.kept("exported", 2, "export", f"exported/{name}", "--for", "blender", "-o", "exported", "-q",
+                  says=f"exported/{name}: lies in the folder that is written to")
+        self.call("verify", "exported")
+
+    def test_a_folder_that_is_moved_away_does_not_come_back(self):
+        for n in range(6):
+            process = subprocess.Popen([NEPHOS, "run", self.scene, "--checkpoint-every", "0", "--set", "time.steps=20000", "--statistics-only", "--out", "out", "-q"],
+                                       cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+            while process.poll() is None and not (self.folder / "out/checkpoint.nephos").exists():
+                time.sleep(0.01)
+            time.sleep(0.013 * n)
+            (self.folder / "out").rename(self.folder / f"away{n}")
+            _, said = process.communicate(timeout=60)
+            self.assertEqual(process.returncode, 3, said)
+            self.assertIn("the folder was removed or renamed", said)
+            self.assertFalse((self.folder / "out").exists())
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
