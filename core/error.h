@@ -25,10 +25,17 @@ struct SourcePosition {
     int column = 0;
 };
 
+// Returns a text without bytes of 0, each of which has become the word \u0000: what() would end there.
+inline std::string without_zeros(std::string text) {
+    for (std::size_t at = text.find('\0'); at != text.npos; at = text.find('\0', at))
+        text.replace(at, 1, "\\u0000");
+    return text;
+}
+
 class Error : public std::runtime_error {
   public:
     Error(ErrorCode code, const std::string& message, SourcePosition where = {})
-        : std::runtime_error(message), code_(code), where_(std::move(where)) {}
+        : std::runtime_error(without_zeros(message)), code_(code), where_(std::move(where)) {}
 
     ErrorCode code() const noexcept { return code_; }
     const SourcePosition& where() const noexcept { return where_; }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <system_error>
 #include <unordered_map>
 #include <unordered_set>
@@ -193,6 +194,11 @@ void merge_doubles(nlohmann::ordered_json::object_t& members) {
 }
 
 nlohmann::ordered_json parsed_json_text(std::string_view text, JsonLists lists, std::size_t* error) {
+    // The parser takes a byte of 0 for the end of the text.
+    if (const std::size_t zero = text.find('\0'); zero != text.npos) {
+        if (error != nullptr) *error = zero + 1;
+        return Json(Json::value_t::discarded);
+    }
     Builder builder(lists);
     if (Json::sax_parse(text, &builder)) return builder.take();
     if (error != nullptr) *error = builder.error();
@@ -200,11 +206,15 @@ nlohmann::ordered_json parsed_json_text(std::string_view text, JsonLists lists, 
 }
 
 std::string read_json_text(const std::filesystem::path& file) {
-    require_regular_file(file);
-    std::error_code failure;
-    const std::uintmax_t bytes = std::filesystem::file_size(file, failure);
-    if (failure) throw ReadFailure(file, failure.message());
-    return read_beginning(file, std::size_t(bytes));
+    std::ifstream stream = open_stream(file);
+    std::string text, piece(std::size_t(1) << 20, '\0');
+    while (stream.read(piece.data(), std::streamsize(piece.size())) || stream.gcount() > 0) {
+        text.append(piece, 0, std::size_t(stream.gcount()));
+        // No text has one, and a file with a hole may have very many.
+        if (text.find('\0', text.size() - std::size_t(stream.gcount())) != text.npos) return text;
+    }
+    check_reading(stream, file);
+    return text;
 }
 
 nlohmann::ordered_json parsed_json(const std::filesystem::path& file, JsonLists lists) {

@@ -55,7 +55,7 @@ enum class JsonLists { kept, left_out };  // null stands where one was left out
 nlohmann::ordered_json parsed_json_text(std::string_view text, JsonLists lists = JsonLists::kept,
                                         std::size_t* error = nullptr);
 
-// Returns the bytes of a file. Throws Error(io) naming it.
+// Returns the bytes of a file, or its beginning where there is a byte of 0, which no JSON has. Throws Error(io) naming it.
 std::string read_json_text(const std::filesystem::path& file);
 
 // Parses a file as parsed_json_text(). Throws Error(io) naming it, with the line where it is no JSON.

@@ -47,6 +47,7 @@ RunListing read_run(const std::filesystem::path& folder) {
     run.complete = earlier.complete;
     run.render = earlier.render;
     run.range = earlier.range;
+    run.steps_reported = earlier.steps_reported;
     run.scene_file = earlier.scene_file;
     run.inputs = earlier.inputs;
     run.branch = earlier.branch;

@@ -30,6 +30,7 @@ struct RunListing {
     bool complete = false;
     bool render = false;
     SimulationRange range;
+    std::uint64_t steps_reported = 0;
     std::vector<ListedFrame> frames;    // in the manifest's order
     std::vector<FileRecord> run_files;  // of a complete run
     std::vector<RunInput> inputs;  // files that the scene names; none in a manifest of an earlier version

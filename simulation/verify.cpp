@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "simulation/run_listing.h"
 #include "simulation/sealed_json.h"
+#include "simulation/statistics_file.h"
 #include "simulation/verify_content.h"
 #include "simulation/verify_problems.h"
 #include "simulation/verify_replay.h"
@@ -56,13 +57,36 @@ Check check_numbers(const RunListing& run) {
     expect(last + 1);
     if (!run.complete)
         problems.add(fmt::format("the run is not complete: {} frames are done", numbers.size()));
+    if (run.complete && last < run.range.first_frame && numbers.empty())
+        return {"frames", true, "of statistics alone"};
     return problems.check(
         "frames", fmt::format("{} frames, {} to {}, no gap", numbers.size(), run.range.first_frame, last));
+}
+
+// Returns the hashes of all steps that a run reports.
+std::vector<StateHash> hashes_of_steps(const RunListing& run) {
+    std::vector<StateHash> hashes;
+    read_statistics(RunFolder{run.folder, run.scene.name}.statistics(), run.steps_reported,
+                    [&](std::uint64_t, std::string_view, const StateHash& hash) { hashes.push_back(hash); });
+    return hashes;
 }
 
 Check compare_runs(const RunListing& run, const std::filesystem::path& other_folder) {
     const RunListing other = read_run(other_folder);
     Problems problems;
+    std::size_t steps = 0;
+    try {
+        const std::vector<StateHash> own = hashes_of_steps(run), others = hashes_of_steps(other);
+        if (others.size() != own.size())
+            problems.add(fmt::format("it has {} steps, not {}", others.size(), own.size()));
+        steps = std::min(own.size(), others.size());
+        for (std::size_t n = 0; n < steps; ++n)
+            if (!(own[n] == others[n])) problems.add(fmt::format("step {}: another state", n));
+    } catch (const ReadFailure&) {
+        throw;
+    } catch (const Error& error) {
+        problems.add(error.what());
+    }
     std::map<int, const ListedFrame*> frames;
     for (const ListedFrame& frame : other.frames) frames[frame.number] = &frame;
     if (other.frames.size() != run.frames.size())
@@ -78,8 +102,8 @@ Check compare_runs(const RunListing& run, const std::filesystem::path& other_fol
             if (!file.voxels.empty() && voxels[file.path] != file.voxels)
                 problems.add(file.path + ": other voxels");
     }
-    return problems.check("against", fmt::format("{}: the same states and voxels in {} frames",
-                                                 other_folder.string(), run.frames.size()));
+    return problems.check("against", fmt::format("{}: the same states in {} steps and voxels in {} frames",
+                                                 other_folder.string(), steps, run.frames.size()));
 }
 
 }  // namespace

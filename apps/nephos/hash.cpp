@@ -16,6 +16,7 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/random.h"
+#include "scenes/format/text.h"
 #include "simulation/layer_simulation.h"
 
 namespace nephos {
@@ -38,10 +39,22 @@ std::vector<std::string> expected_lines(const std::string& path) {
         throw Error(ErrorCode::io, path + ": is a device: expected a file");
     std::ifstream stream(path);
     if (!stream) throw Error(ErrorCode::io, path + ": cannot open: " + std::strerror(errno));
+    constexpr std::size_t kLongest = 4096;  // of a comment; steps and their hashes are far shorter
     std::vector<std::string> lines;
-    for (std::string line; std::getline(stream, line);) {
-        if (!line.empty() && line.front() != '#') lines.push_back(line);
+    std::string line(kLongest, '\0');
+    std::size_t number = 1;
+    for (; stream.getline(line.data(), kLongest); ++number) {
+        std::string_view text = line.data();
+        if (text.ends_with('\r')) text.remove_suffix(1);
+        if (std::size_t(stream.gcount()) > line.find('\0') + 1)
+            throw Error(ErrorCode::usage, fmt::format("{}:{}: holds a byte that no text has", path, number));
+        if (!text.empty() && text.front() != '#') lines.emplace_back(text);
     }
+    if (!stream.eof() && !stream.bad())
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: line {} has {} bytes or more: expected lines such as `nephos hash` "
+                                "prints them",
+                                path, number, kLongest - 1));
     if (stream.bad()) throw Error(ErrorCode::io, path + ": cannot read: " + std::strerror(errno));
     return lines;
 }
@@ -64,7 +77,7 @@ int hash(const HashArguments& a) {
             output.flush();
             throw Error(ErrorCode::check,
                         fmt::format("{}: step {} should be '{}', but is '{}'", a.check, step,
-                                    step < expected.size() ? expected[step] : "(no line)", line));
+                                    step < expected.size() ? shortened(expected[step]) : "(no line)", line));
         }
         if (a.work.json) {
             hashes.push_back(hash);

@@ -103,22 +103,32 @@ void explain(const MetarArguments& a, const Taf& taf) {
     for (const std::string& note : taf.notes) print_note(note);
 }
 
+void require_content(const Metar& report) {
+    if (!tells_nothing(report)) return;
+    throw Error(
+        ErrorCode::usage,
+        "the report tells nothing but place and time: expected wind, visibility, weather or clouds\n  " +
+            report.text + "\n  " + std::string(report.text.size(), ' ') + "^");
+}
+
 int metar(const MetarArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     const std::string text = report_of(a.report);
     if (a.report.starts_with('@')) refuse_to_replace(a.report.substr(1), a.scene);
     std::optional<Taf> taf;
     Metar report;
-    if (is_taf(text)) {
-        taf = parse_taf(text, a.lenient, a.options.date);
-        report.text = taf->text;
-        report.station = taf->station;
-    } else {
-        report = parse_metar(text, a.lenient);
-        if (tells_nothing(report))
-            throw Error(ErrorCode::usage,
-                        "the report tells nothing but place and time: expected wind, visibility, weather or clouds\n  " +
-                            report.text + "\n  " + std::string(report.text.size(), ' ') + "^");
+    try {
+        if (is_taf(text)) {
+            taf = parse_taf(text, a.lenient, a.options.date);
+            report.text = taf->text;
+            report.station = taf->station;
+        } else {
+            report = parse_metar(text, a.lenient);
+            require_content(report);
+        }
+    } catch (const Error& error) {
+        if (!a.report.starts_with('@')) throw;
+        throw Error(error.code(), a.report.substr(1) + ": " + error.what());
     }
     if (a.explain) {
         taf ? explain(a, *taf) : explain(a, report);

@@ -6,6 +6,7 @@
 //     0 done    1 a check failed    2 usage or scene    3 input or output    4 GPU    130 Ctrl-C    143
 //     SIGTERM
 
+#include <algorithm>
 #include <filesystem>
 #include <new>
 #include <string>
@@ -96,6 +97,14 @@ std::string_view option_without_value(int argc, const char* const* argv) {
     return {};
 }
 
+// An option or argument whose value is an empty text, as of a variable of a script that is not set: nothing takes one, and
+// much would take it for an option that is not there.
+const CLI::Option* option_with_empty_value(const CLI::App& command) {
+    for (const CLI::Option* option : command.get_options())
+        if (option->count() > 0 && std::ranges::count(option->results(), "") > 0) return option;
+    return nullptr;
+}
+
 int run_command(CLI::App& app, int argc, const char* const* argv, const EditFunction& edit) {
     Action action;
     add_commands(app, action, edit);
@@ -115,6 +124,12 @@ int run_command(CLI::App& app, int argc, const char* const* argv, const EditFunc
         return report_usage(command, explain(command, error));
     } catch (const Error& error) {  // from the checked conversion of a value (arguments.h)
         return report_usage(parsed_app(app), error.what());
+    }
+    const CLI::App& command = parsed_app(app);
+    if (const CLI::Option* option = option_with_empty_value(command)) {
+        const std::string name =
+            option->get_lnames().empty() ? option->get_name() : "--" + option->get_lnames().front();
+        return report_usage(command, name + " is empty: expected " + option->get_type_name());
     }
     return action();
 }

@@ -104,8 +104,12 @@ void check_frames(const SectionReader& reader, const Scene& scene) {
                   "expected `frames.count` up to " + std::to_string(frame_count(all)) + ", or more steps");
 }
 
+// Sets a range that was not given to the lattice, as far as the keys go: the scene's text has it.
 void replace_infinite(Range& range, double low, double size) {
-    if (std::isinf(range.min)) range = {low, low + size};
+    constexpr double kFarthest_m = 1e7;
+    if (std::isinf(range.min))
+        range = {std::clamp(low, -kFarthest_m, kFarthest_m),
+                 std::clamp(low + size, -kFarthest_m, kFarthest_m)};
 }
 
 }  // namespace

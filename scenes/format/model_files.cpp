@@ -57,6 +57,10 @@ class ModelFiles {
     // Adds the [[model]] tables of a file; `name` is the item of `models` that names it. Returns false when there are
     // too many files, or they are too large, which is reported as any other problem.
     bool add(const Node& name, const std::string& path_of_item, std::vector<Node>& models) {
+        if (name.text.empty() || name.text.find('\0') != std::string::npos) {
+            document_.report(name.place, enclosed(path_of_item, '`') + " names no file");
+            return true;
+        }
         const bool in_file = document_.origin(name.place.origin).is_file;
         const fs::path path = in_file ? normal_path(folder_ / name.text) : fs::path(name.text);
         auto found = files_.find(path.string());

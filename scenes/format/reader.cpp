@@ -32,6 +32,8 @@ std::string advice_on_unknown_key(const Section& section, const std::string& nam
     if (!meant.empty()) return "did you mean " + enclosed(meant, '`') + "?";
     std::vector<std::string> namesakes;
     find_namesakes(scene_section(), {}, name, namesakes);
+    if (namesakes.size() == 1 && namesakes.front() == enclosed(name, '`'))
+        return "it is a key of the scene itself, and none of a table in it";
     if (!namesakes.empty() && namesakes.size() <= 3) return "did you mean " + joined(namesakes) + "?";
     std::vector<std::string> quoted;
     for (const std::string_view known : names) quoted.push_back(enclosed(known, '`'));

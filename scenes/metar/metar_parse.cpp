@@ -93,9 +93,13 @@ class Reader {
     [[noreturn]] void fail(const std::string& expected) const {
         const std::size_t column = done() ? metar_.text.size() : words_[at_].column;
         const std::size_t length = done() ? 1 : word().size();
-        throw Error(ErrorCode::usage, (done() ? std::string("the report ends early") : "`" + word() + "`") +
-                                          ": " + expected + "\n  " + metar_.text + "\n  " +
-                                          std::string(column, ' ') + std::string(length, '^'));
+        constexpr std::size_t kLongestWord = 60, kLongest = 1000;  // far longer than those of reports
+        std::string shown = done() ? "" : word();
+        if (shown.size() > kLongestWord) shown = shown.substr(0, kLongestWord) + "...";
+        const std::string what = (done() ? "the report ends early" : "`" + shown + "`") + ": " + expected;
+        if (metar_.text.size() > kLongest) throw Error(ErrorCode::usage, what);
+        throw Error(ErrorCode::usage, what + "\n  " + metar_.text + "\n  " + std::string(column, ' ') +
+                                          std::string(length, '^'));
     }
 
     Metar take_rest(const char* meaning) {

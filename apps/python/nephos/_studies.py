@@ -18,6 +18,8 @@ import numpy
 
 from ._nephos import Error, Scene, _toml_text
 
+# A number as the tables have them.
+_NUMBER = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?(e[-+]?[0-9]+)?")
 _WORDS = ("run", "status", "regime", "state_hash", "message", "command")
 
 
@@ -72,11 +74,13 @@ def _column(name, values):
         return numpy.array(values)
     if name == "seed":
         return numpy.array([int(value) for value in values], dtype=numpy.uint64)
-    for kind in (int, float):
-        try:
-            return numpy.array([kind(value or "nan") for value in values])
-        except ValueError:
-            pass
+    # Texts such as "007" and "2024_01", which are names, are no numbers, though Python takes them for some.
+    if all(_NUMBER.fullmatch(value) for value in values if value):
+        for kind in (int, float):
+            try:
+                return numpy.array([kind(value or "nan") for value in values])
+            except ValueError:
+                pass
     return numpy.array(values)
 
 

@@ -30,6 +30,21 @@ class Hash(Case):
         self.refused(1, "hash", self.scene, "--steps", "5", "--check", "golden.txt", says="step 5")
         self.refused(1, "hash", self.scene, "--steps", "3", "--check", "golden.txt", says="4 steps")
 
+    def test_what_is_compared_is_a_text_of_steps(self):
+        lines = self.hashes(self.scene, "--steps", "4").splitlines()
+        call = ("hash", self.scene, "--steps", "4", "--check", "golden.txt")
+        (self.folder / "golden.txt").write_bytes("\r\n".join(lines + ["# " + "x" * 4000]).encode())
+        self.call(*call)
+        self.write("golden.txt", lines[0] + "\n" + "x" * 10_000_000)
+        self.assertLess(len(self.refused(2, *call, says="golden.txt: line 2 has 4095 bytes or more: expected lines such as").stderr), 300)
+        self.write("golden.txt", lines[0] + "\n" + "x" * 3000)
+        self.assertLess(len(self.refused(1, *call, says="step 1 should be").stderr), 400)
+        with open(self.folder / "golden.txt", "wb") as file:
+            file.truncate(3 << 30)  # a hole
+        self.refused(2, *call, says="golden.txt: line 1 has 4095 bytes or more")
+        (self.folder / "golden.txt").write_bytes(lines[0].encode() + b"\0\n")
+        self.refused(2, *call, says="golden.txt:1: holds a byte that no text has")
+
 
 class State(Case):
     def test_what_is_read_is_not_replaced(self):

@@ -90,6 +90,13 @@ class Metar(Case):
         for nothing in ("EGLL 211350Z", "METAR KXYZ 211350Z AUTO RMK AO2"):
             self.assertIn("tells nothing but place and time", self.call("metar", nothing, status=2).stderr)
         self.assertIn("empty", self.call("metar", "", status=2).stderr)
+        # Of a file: its name, and all that is wrong, whatever byte is in it.
+        (self.folder / "report.txt").write_bytes(b"METAR EGLL 211350Z 24012KT 9999 SC\0T045")
+        self.assertIn("report.txt: `SC\\u0000T045`: expected ", self.call("metar", "@report.txt", status=2).stderr)
+        (self.folder / "report.txt").write_bytes(b"METAR EGLL 211350Z 24012KT " + b"X" * 3900)
+        said = self.call("metar", "@report.txt", status=2).stderr
+        self.assertIn("report.txt: `" + "X" * 60 + "...`: expected", said)
+        self.assertLess(len(said), 300)
         self.assertIn("left out", self.call("metar", "EGLL 211350Z 24012KT 9999 FEWO20", "--lenient", "--explain").stderr)
         self.assertIn("does not fit", self.call("metar", REAL[0], "--date", "2024-06-22", status=2).stderr)
 

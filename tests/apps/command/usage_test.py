@@ -29,6 +29,18 @@ class Usage(Case):
     def test_version(self):
         self.assertRegex(self.call("--version").stdout, r"^nephos \d+\.\d+\.\d+ \(random stream \d+\)\n$")
 
+    def test_empty_values_are_none(self):
+        """As of a variable of a script that is not set."""
+        for arguments, option in ((["hash", self.scene, "--check", ""], "--check"), (["run", self.scene, "--from", ""], "--from"),
+                                  (["run", ""], "SCENE"), (["run", self.scene, "--set", "time.steps=3", "--set", ""], "--set"),
+                                  (["hash", self.scene, "--from", ""], "--from"), (["verify", "out", "--against", ""], "--against"),
+                                  (["metar", "EGLL 211350Z 24012KT", "-o", ""], "--scene"), (["export", "out", "--for", ""], "--for"),
+                                  (["render", "cloud.vdb", "--out", "a.png", "--scene", ""], "--scene")):
+            result = self.call(*arguments, status=2)
+            self.assertEqual(result.stdout, "")
+            self.assertRegex(result.stderr, f"^error: {option}.* is empty: expected")
+        self.assertEqual(list(self.folder.iterdir()), [self.folder / "tiny.toml"])
+
     def test_bad_arguments_are_status_2(self):
         for arguments, says in (
             ([], "a command is missing"),

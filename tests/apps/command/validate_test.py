@@ -4,7 +4,7 @@
 import json
 import unittest
 
-from case import BAD, Case, SOURCE
+from case import BAD, Case, SCENE, SOURCE
 
 
 class Scenes(Case):
@@ -63,6 +63,17 @@ apron_cells = 0
         hashes = [json.loads(self.call("validate", p, "--json").stdout)[0]["scene_hash"]
                   for p in (self.scene, "again/tiny.toml")]
         self.assertEqual(*hashes)
+
+    def test_the_printed_scene_of_a_far_lattice(self):
+        far = self.write("far.toml", "[lattice]\ncells = [8, 8, 8]\ncell_size_m = 100\norigin_m = [0, 10000000, 0]\n[[field.scatters]]\n"
+                                     "count = 1\ncentre = { hum = 0.1, act = 0.01, ext = 0.1 }\n")
+        printed = self.write("printed.toml", self.call("validate", far, "--print").stdout)
+        self.assertIn("\ny_m = 10000000.0\n", self.call("validate", printed, "--print").stdout)
+
+    def test_names_of_files_with_a_byte_of_zero(self):
+        scene = self.write("models.toml", SCENE.replace("seed = 3\n", 'seed = 3\nmodels = ["Ns.toml\\u0000junk"]\n'))
+        self.write("Ns.toml", "")
+        self.assertIn("`models[0]` names no file", self.call("validate", scene, status=2).stderr)
 
     def test_set_and_seed_change_the_scene(self):
         base = self.hashes(self.scene, "--steps", "3")

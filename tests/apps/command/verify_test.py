@@ -155,6 +155,30 @@ class Verify(Case):
             path.write_text(unsealed(listing))
             self.assertEqual(self.checks(folder)["list"]["detail"], f"{file}, of an earlier version, has no checksum")
 
+    def test_what_follows_a_list(self):
+        """A byte of 0 is the end of the text to many parsers; and a file may have a hole of gigabytes."""
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        self.call("export", "out", "--to", "raw", "-o", "exported")
+        for name in ("out/manifest.json", "exported/export.json"):
+            path = self.folder / name
+            whole = path.read_bytes()
+            for tail in (b"\0 this is no JSON {{{", b"\0" * 100, b"x"):
+                path.write_bytes(whole + tail)
+                self.refused(3, "verify", name.split("/")[0], says=f"{name}: is no JSON, or is damaged: line")
+            with open(path, "ab") as file:
+                file.truncate(3 << 30)
+            self.refused(3, "verify", name.split("/")[0], says=f"{name}: is no JSON, or is damaged: line")
+            path.write_bytes(whole)
+
+    def test_against_runs_of_statistics_alone(self):
+        for name, seed in (("a", 1), ("b", 1), ("c", 9)):
+            self.call("run", self.scene, "--statistics-only", "--seed", seed, "--out", name)
+        self.call("run", self.scene, "--statistics-only", "--seed", 1, "--set", "time.steps=4", "--out", "short")
+        self.assertEqual(self.checks("a", "--against", "b")["against"]["detail"], "b: the same states in 7 steps and voxels in 0 frames")
+        self.assertEqual(self.checks("a")["frames"]["detail"], "of statistics alone")
+        self.assertEqual(self.failed("a", "--against", "c"), ["against"])
+        self.assertIn("it has 5 steps, not 7", self.call("verify", "a", "--against", "short", status=1).stdout)
+
     def test_impossible_numbers_and_paths_of_a_manifest(self):
         self.call("run", self.scene, "--no-render", "--out", "whole")
         whole = json.loads((self.folder / "whole/manifest.json").read_text())

@@ -278,6 +278,14 @@ class Studies(Case):
                          (numpy.uint64, numpy.float64, "i", "U"))
         numpy.testing.assert_array_equal(runs["field.background.ext"], numpy.repeat([0.05, 0.1], 4))
         self.assertEqual(len(sweep.failures()["message"]), 0)
+        # Names that Python takes for numbers stay names.
+        rows = (sweep.folder / "runs.csv").read_text()
+        for name, kind in (("2024_01", "U"), ("007", "U"), ("nan", "U"), ("1e5", "f"), ("-3", "i"), ("0.25", "f")):
+            (sweep.folder / "runs.csv").write_text(rows.replace(",0.1,", f",{name},").replace(",0.05,", f",{name},"))
+            found = sweep.runs()["field.background.ext"]
+            self.assertEqual((found.dtype.kind, len(set(found))), (kind, 1), name)
+            self.assertTrue(kind != "U" or found[0] == name)
+        (sweep.folder / "runs.csv").write_text(rows)
         self.assertTrue(sweep.report().read_text().startswith("<!DOCTYPE html>"))
         # Another look at the folder, and the same call, compute nothing.
         before = (sweep.folder / "shards/0000-of-0001.jsonl").stat().st_mtime_ns
