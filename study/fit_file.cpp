@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "study/axis_text.h"
 #include "study/cloud_mask.h"
 #include "study/fit.h"
 #include "study/run_statistics.h"
@@ -48,7 +49,7 @@ std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem:
     try {
         base.source.emplace(base.scene_file);
         const SweepPlan plan(base);
-        const AutomatonOptions lattice = automaton_options(plan.scene(), plan.measured_lattice());
+        const AutomatonOptions lattice = plan.lattice();
         return Measured{*scene, lattice.extent, lattice.placement.cell_size_m, lattice.placement.origin_m.z};
     } catch (const SceneErrors& errors) {
         for (const Problem& problem : errors.problems()) {
@@ -89,6 +90,10 @@ bool check_end(TomlTable& parameter, TomlTable& prior, const std::string& end, c
 // A key that stands in one parameter, and that the runs depend on beside their seeds and numbers.
 bool check_key(TomlTable& parameter, const std::string& key, std::set<std::string>& known) {
     const std::string place = parameter.has("key") ? "key" : "keys";
+    if (const std::string problem = no_key_text(key); !problem.empty()) {
+        parameter.report(place, problem, std::string(kExpectedKey));
+        return false;
+    }
     if (key == "seed" || key == "time.steps" || key == "name") {
         parameter.report(place, "`" + key + "` is no parameter of a fit",
                          "expected a key that changes clouds; `seed` and [steps] of the fit are its own");

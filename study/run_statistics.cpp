@@ -7,6 +7,7 @@
 
 #include "statistics/cloud_statistics.h"
 #include "statistics/tracks.h"
+#include "study/measured_lattice.h"
 #include "study/snapshot.h"
 #include "study/thumbnail.h"
 #include <fmt/format.h>
@@ -55,7 +56,7 @@ class Measurement {
     Measurement(const Scene& scene, const SweepOptions& options)
         : options_(options),
           layers_(make_layers(scene, initial_state(scene))),
-          measured_(index_of(scene, options.layer)),
+          measured_(measured_lattice(scene, options.layer)),
           lattice_(automaton_options(scene, measured_)),
           activation_(largest_activation(scene)) {
         const Wind& wind = scene.layers.empty() ? scene.automaton.wind : layer_wind(scene, measured_);
@@ -92,11 +93,6 @@ class Measurement {
         }
     }
     std::vector<double> tracks(const Judgement& judgement) const;
-    static std::size_t index_of(const Scene& scene, const std::string& name) {
-        for (std::size_t n = 0; n < scene.layers.size(); ++n)
-            if (scene.layers[n].name == name) return n;
-        return 0;
-    }
     const Automaton& automaton() const { return *layers_[measured_].automaton(); }
     void observe();
     void observe_clouds(const BitPlaneView& cld, std::uint64_t step);

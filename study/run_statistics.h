@@ -105,8 +105,7 @@ struct RunResult {
     std::string thumbnail;       // of the last state, thumbnail.h; a sweep keeps that of the first replicate
 };
 
-// Runs the scene from its start by the rules of `options`, which has its `layer` set where the scene has layers. Throws as
-// LayerSimulation. Calls `files_are_read` when it has read all that the scene names. The result does not depend on the number
+// Runs the scene from its start by the rules of `options`. Throws as LayerSimulation and measured_lattice(). Calls `files_are_read` when it has read all that the scene names. The result does not depend on the number
 // of threads.
 RunResult run_for_statistics(const Scene& scene, const SweepOptions& options, bool with_thumbnail = true,
                              const std::function<void()>& files_are_read = {});

@@ -24,6 +24,33 @@ constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr std::uint64_t kMostValues = 100'000;
 const std::vector<std::string_view> kScaleNames{"linear", "log", "integer"};
 
+void read_range(TomlTable& range, Axis& axis) {
+    const std::optional<double> from = range.number("from", -kLargest, kLargest),
+                                to = range.number("to", -kLargest, kLargest);
+    axis.scale = Scale(range.word("scale", kScaleNames).value_or(0));
+    const std::optional<std::uint64_t> count = range.integer("count", 2, kMostValues);
+    for (const char* name : {"from", "to"})
+        if (!range.has(name))
+            range.report(name, fmt::format("the range has no `{}`", name),
+                         "expected range = { from = 0.05, to = 0.4, count = 8 }");
+    if (!from || !to) return;
+    axis.from = *from;
+    axis.to = *to;
+    if (!(axis.to > axis.from))
+        return range.report("to", "the range of an axis is empty", "expected `to` above `from`");
+    if (axis.scale == Scale::log && !(axis.from > 0))
+        return range.report("from", "a range on a log scale starts at or below 0", "expected `from` above 0");
+    if (axis.scale == Scale::log && !std::isfinite(axis.to / axis.from))
+        return range.report("from", "a range on a log scale spans more than numbers do",
+                            "expected `from` and `to` with a ratio below 1.7e308");
+    if (!count) return;
+    axis.values = spread_values(axis.from, axis.to, *count, axis.scale);
+    if (axis.values.size() < *count && axis.scale != Scale::integer)
+        range.report("count",
+                     fmt::format("the range has {} different values of 12 digits", axis.values.size()),
+                     "expected a wider range, or fewer values");
+}
+
 void read_axis(TomlTable& table, const std::filesystem::path& folder, SweepOptions& options) {
     Axis& axis = options.axes.emplace_back();
     axis.folder = folder;
@@ -32,27 +59,10 @@ void read_axis(TomlTable& table, const std::filesystem::path& folder, SweepOptio
     if (axis.keys.empty())
         table.report("key", "an axis has no key", "expected key = \"field.background.ext\", or keys = [...]");
     axis.values = table.values("values");
-    bool has_range = false;
-    table.table("range", [&](TomlTable& range) {
-        has_range = true;
-        axis.from = range.number("from", -kLargest, kLargest).value_or(0);
-        axis.to = range.number("to", -kLargest, kLargest).value_or(1);
-        axis.scale = Scale(range.word("scale", kScaleNames).value_or(0));
-        if (!(axis.to > axis.from))
-            range.report("to", "the range of an axis is empty", "expected `to` above `from`");
-        if (axis.scale == Scale::log && !(axis.from > 0))
-            range.report("from", "a range on a log scale starts at or below 0", "expected `from` above 0");
-        else if (axis.scale == Scale::log && !std::isfinite(axis.to / axis.from))
-            range.report("from", "a range on a log scale spans more than numbers do",
-                         "expected `from` and `to` with a ratio below 1.7e308");
-        const auto count = range.integer("count", 2, kMostValues);
-        if (count && axis.to > axis.from) axis.values = spread_values(axis.from, axis.to, *count, axis.scale);
-        if (!axis.values.empty() && axis.values.size() < *count && axis.scale != Scale::integer)
-            range.report("count",
-                         fmt::format("the range has {} different values of 12 digits", axis.values.size()),
-                         "expected a wider range, or fewer values");
-    });
-    if (axis.values.empty() && !has_range)
+    table.table("range", [&](TomlTable& range) { read_range(range, axis); });
+    if (table.has("values") && table.has("range"))
+        table.report("range", "an axis has both values and a range", "expected one of them");
+    if (axis.values.empty() && !table.has("range"))
         table.report("values", "an axis has no values",
                      "expected values = [...], or range = { from = .., to = .., count = .. }");
 }

@@ -10,9 +10,10 @@
 #include <tuple>
 
 #include "study/axis_files.h"
+#include "study/axis_text.h"
+#include "study/measured_lattice.h"
 #include "study/placed_scene.h"
-#include "study/run_statistics.h"
-#include "study/toml_table.h"
+#include "study/plan_checks.h"
 #include <fmt/format.h>
 
 #include "automaton/checkpoint.h"
@@ -31,13 +32,7 @@
 namespace nephos {
 namespace {
 
-constexpr std::uint64_t kMaxPoints = 10'000'000;
-
 StateHash hash_of_text(std::string_view text) { return hash_of_bytes(std::as_bytes(std::span(text))); }
-
-std::string joined_keys(const Axis& axis) { return fmt::format("{}", fmt::join(axis.keys, "+")); }
-
-bool is_sampled(Design design) { return design != Design::grid && design != Design::list; }
 
 std::string value_at(const Axis& axis, double unit) {
     switch (axis.scale) {
@@ -52,165 +47,7 @@ std::string value_at(const Axis& axis, double unit) {
     return number_text(axis.from + unit * (axis.to - axis.from));
 }
 
-// Returns one text for one value: "0.10" is 0.1, a word without quotes gets them, "[1,2]" is "[1, 2]". What is no value
-// stays as it is, and whoever reads the scene with it says why.
-std::string canonical_value(const std::string& value) {
-    if (value.empty() || value == "true" || value == "false") return value;
-    if (std::string_view("\"'[{").find(value[0]) != std::string_view::npos)
-        return canonical_toml(value).value_or(value);
-    const bool has_plus = value[0] == '+' && value.size() > 1 && value[1] != '-';
-    const char *begin = value.data() + has_plus, *end = value.data() + value.size();
-    std::int64_t whole = 0;
-    if (const auto read = std::from_chars(begin, end, whole); read.ec == std::errc() && read.ptr == end) {
-        constexpr std::int64_t kExact = std::int64_t(1) << 53;
-        if (whole < -kExact || whole > kExact)
-            return fmt::format("{}", whole);  // a double may be another number
-    }
-    double number = 0;
-    const auto [last, error] = std::from_chars(begin, end, number);
-    if (error == std::errc() && last == end) return number_text(number == 0 ? 0.0 : number);  // one zero only
-    // 0x10 and 1_000 are numbers of TOML, too.
-    const bool may_be = value.find_first_not_of("0123456789abcdefABCDEFxob_.+-") == value.npos;
-    const std::optional<std::string> other = may_be ? canonical_toml(value) : std::nullopt;
-    if (other && *other != value) return canonical_value(*other);
-    return toml_string(value);
-}
-
-bool is_compound(const std::string& value) { return value.starts_with('[') || value.starts_with('{'); }
-
-std::uint64_t point_count(const SweepOptions& options) {
-    if (is_sampled(options.design)) return options.points;
-    if (options.axes.empty()) return 1;
-    std::uint64_t count = 1;
-    for (const Axis& axis : options.axes) {
-        if (options.design == Design::list) return axis.values.size();
-        count *= axis.values.size();
-        if (count > kMaxPoints) return count;
-    }
-    return count;
-}
-
-// Two equal values of a grid would be points with the same runs.
-void require_different(const Axis& axis, const std::string& name) {
-    std::map<std::string_view, std::size_t> places;
-    for (std::size_t n = 0; n < axis.values.size(); ++n) {
-        const auto [first, is_new] = places.emplace(axis.values[n], n);
-        if (!is_new)
-            throw Error(ErrorCode::usage,
-                        fmt::format("{}: value {} is {}, and so is value {}: expected each value once", name, n + 1,
-                                    axis.values[n], first->second + 1));
-    }
-}
-
-// Refuses keys that overlap: the last one would win, and the id of a run does not tell which that was. Throws Error(usage).
-void require_apart(const std::vector<Axis>& axes) {
-    const auto fail = [](const std::string& message) { throw Error(ErrorCode::usage, message); };
-    std::map<std::string_view, const Axis*> known;
-    for (const Axis& axis : axes) {
-        for (const std::string& key : axis.keys) {
-            const auto [first, is_new] = known.emplace(key, &axis);
-            if (is_new) continue;
-            if (first->second != &axis) fail("key `" + key + "` is in two axes");
-            fail(fmt::format("axis {}: key `{}` is in it twice", joined_keys(axis), key));
-        }
-    }
-    for (const Axis& axis : axes)
-        for (const std::string& key : axis.keys)
-            for (const std::string& outer : outer_keys(key))
-                if (known.contains(outer))
-                    fail(fmt::format(
-                        "keys `{0}` and `{1}` overlap: a value of `{0}` holds one of `{1}`, and their "
-                        "order would decide; expected one of them",
-                        outer, key));
-}
-
-void check_options(const SweepOptions& options) {
-    const auto fail = [](const std::string& message) { throw Error(ErrorCode::usage, message); };
-    constexpr std::uint64_t kLargestSeed =
-        std::numeric_limits<std::int64_t>::max();  // of the sweep's own file
-    if (options.seed > kLargestSeed)
-        fail(fmt::format("seed: {} is not from 0 to {}", options.seed, kLargestSeed));
-    if (options.replicates < 1 || options.replicates > 100'000)
-        fail(fmt::format("replicates: {} is not from 1 to 100,000", options.replicates));
-    if (options.steps.min < 20 || options.steps.max < options.steps.min || options.steps.max > kMaxSteps)
-        fail(fmt::format("steps: {}..{} is not a range from 20 steps upwards", options.steps.min,
-                         options.steps.max));
-    if (is_sampled(options.design) && options.axes.empty())
-        fail(fmt::format("design '{}': has no axis to take points from: expected --axis KEY=FROM..TO",
-                         design_name(options.design)));
-    if (!is_sampled(options.design) && options.points > 0)
-        fail(fmt::format(
-            "points: a design '{}' has the points of its values: expected no number of points, or a "
-            "sampled design",
-            design_name(options.design)));
-    if (options.steps.until && options.clouds_every == 0 && is_of_snapshots(options.steps.until->statistic))
-        fail(fmt::format(
-            "until: `{}` is of snapshots, and clouds_every = 0 takes none: expected another statistic, or "
-            "--clouds-every N",
-            options.steps.until->statistic));
-    for (const Axis& axis : options.axes) {
-        const std::string name = "axis " + joined_keys(axis);
-        if (axis.scale == Scale::integer &&
-            (axis.from != std::floor(axis.from) || axis.to != std::floor(axis.to)))
-            fail(fmt::format("{}: has a range of whole numbers from {} to {}, which are not whole", name,
-                             number_text(axis.from), number_text(axis.to)));
-        for (const std::string& key : axis.keys) {
-            if (key == "seed") fail(name + ": the seed is not an axis: give the number of replicates");
-            if (key == "time.steps") fail(name + ": the steps are not an axis: give the range of steps");
-            if (key == "time")
-                fail(name + ": has the steps in it, which are not an axis: name one of its keys");
-            if (key == "name") fail(name + ": the name of the scene changes nothing");
-            if (key == "models")
-                fail(name +
-                     ": files with base models are not an axis: name all of them in the scene, and vary the "
-                     "`models` of a sky");
-        }
-        if (is_sampled(options.design)) {
-            if (!axis.values.empty())
-                fail(fmt::format("{}: a design '{}' takes a range, not values: expected {}=FROM..TO", name,
-                                 design_name(options.design), joined_keys(axis)));
-            if (!(axis.to > axis.from)) fail(name + ": the range is empty");
-            if (axis.scale == Scale::log && !(axis.from > 0))
-                fail(name + ": a range on a log scale starts above 0");
-        } else if (axis.values.empty()) {
-            fail(fmt::format("{}: has a range without a number of values: expected {}=FROM..TO:COUNT, or --points N "
-                             "for a sampled design",
-                             name, joined_keys(axis)));
-        }
-        if (options.design == Design::grid) require_different(axis, name);
-        if (options.design == Design::list && axis.values.size() != options.axes.front().values.size())
-            fail(fmt::format("{}: has {} values, the first axis {}: a list takes one of each for a point",
-                             name, axis.values.size(), options.axes.front().values.size()));
-    }
-    require_apart(options.axes);
-    if (is_sampled(options.design) && (options.points < 1 || options.points > kMaxPoints))
-        fail(fmt::format("design '{}': expected points from 1 to {}", design_name(options.design),
-                         kMaxPoints));
-    if (point_count(options) > kMaxPoints) fail(fmt::format("the grid has more than {} points", kMaxPoints));
-}
-
 }  // namespace
-
-std::string canonical_key(std::string_view key) {
-    constexpr std::string_view kBlank = " \t";
-    const std::size_t first = key.find_first_not_of(kBlank);
-    if (first == key.npos) return {};
-    key = key.substr(first, key.find_last_not_of(kBlank) - first + 1);
-    std::string text;
-    for (std::size_t n = 0; n < key.size(); ++n) {
-        const bool is_leading = key[n] == '0' && !text.empty() && text.back() == '[';
-        if (is_leading && n + 1 < key.size() && key[n + 1] >= '0' && key[n + 1] <= '9') continue;
-        text += key[n];
-    }
-    return text;
-}
-
-std::vector<std::string> outer_keys(std::string_view key) {
-    std::vector<std::string> outer;
-    for (std::size_t n = 1; n < key.size(); ++n)
-        if (key[n] == '.' || key[n] == '[') outer.emplace_back(key.substr(0, n));
-    return outer;
-}
 
 double largest_activation(const Scene& scene) {
     if (!scene.layers.empty()) return 1;
@@ -232,26 +69,16 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     if (!options_.source) options_.source.emplace(options_.scene_file);
     scene_ = options_.source->read(options_.overrides, SceneUse::without_frames);
     stamps_ = stamps_of(scene_, {FileKind::first_state, FileKind::simulation});
-    std::vector<std::string> lattices;
-    for (const LayerOptions& layer : scene_.layers)
-        if (layer.automaton && !layer.is_veil) lattices.push_back(layer.name);
-    if (scene_.layers.empty() ? !options_.layer.empty()
-                              : lattices.size() != 1 && std::ranges::count(lattices, options_.layer) == 0) {
-        throw Error(
-            ErrorCode::usage,
-            fmt::format(
-                "{}: {}", options_.scene_file.string(),
-                scene_.layers.empty()
-                    ? "has no layers: leave out --layer"
-                    : fmt::format("has the layers with an automaton {}: name one of them with --layer",
-                                  fmt::join(lattices, ", "))));
+    try {
+        const std::size_t measured = check_measured(scene_);
+        if (!scene_.layers.empty()) options_.layer = scene_.layers[measured].name;
+        lattice_ = automaton_options(scene_, measured);
+    } catch (const SceneErrors&) {
+        throw;
+    } catch (const Error& error) {
+        if (error.code() != ErrorCode::usage) throw;
+        throw Error(ErrorCode::usage, fmt::format("{}: {}", options_.scene_file.string(), error.what()));
     }
-    if (!scene_.layers.empty() && options_.layer.empty()) options_.layer = lattices.front();
-    if (options_.tracks && !is_profile(automaton_options(with_files(scene_), measured_lattice()).wind.fields))
-        throw Error(ErrorCode::usage,
-                    options_.scene_file.string() +
-                        ": has a wind that differs within a level, and clouds are followed only in one "
-                        "that is the same all over each level: leave out --tracks");
     points_ = point_count(options_);
     if (is_sampled(options_.design))
         unit_points_ = unit_points(options_.design, points_, options_.axes.size(), options_.seed);
@@ -261,9 +88,41 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     simulation_hash_ = simulation_start(scene_).simulation_hash;
 }
 
-std::size_t SweepPlan::measured_lattice() const {
-    const auto found = std::ranges::find(scene_.layers, options_.layer, &LayerOptions::name);
-    return found == scene_.layers.end() ? 0 : std::size_t(found - scene_.layers.begin());
+std::size_t SweepPlan::check_measured(const Scene& scene) const {
+    const std::size_t measured = measured_lattice(scene, options_.layer);
+    if (options_.tracks && !is_profile(automaton_options(with_files(scene), measured).wind.fields))
+        throw Error(ErrorCode::usage,
+                    "the scene has a wind that differs within a level, and clouds are followed only in one "
+                    "that is the "
+                    "same all over each level: leave out --tracks");
+    return measured;
+}
+
+void SweepPlan::check_measured(const Axis& axis, std::size_t n, const std::string& value,
+                               const Scene& scene) const {
+    try {
+        check_measured(scene);
+    } catch (const SceneErrors&) {
+        throw;
+    } catch (const Error& error) {
+        if (error.code() != ErrorCode::usage) throw;
+        throw Error(ErrorCode::usage, fmt::format("axis {}: value {} is {}: {}", joined_keys(axis), n + 1,
+                                                  value, error.what()));
+    }
+}
+
+bool SweepPlan::varies_lattice() const {
+    return std::ranges::any_of(options_.axes, [](const Axis& axis) {
+        return std::ranges::any_of(axis.keys, [](const std::string& key) {
+            return key.starts_with("time") || key.starts_with("lattice") || key.starts_with("layer");
+        });
+    });
+}
+
+AutomatonOptions SweepPlan::lattice_of(const PlannedRun& run) const {
+    if (!varies_lattice()) return lattice_;
+    const Scene scene = scene_of(run);
+    return automaton_options(scene, measured_lattice(scene, options_.layer));
 }
 
 std::string SweepPlan::scene_text_in(const std::filesystem::path& folder) const {
@@ -287,6 +146,7 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
             std::vector<std::string> overrides = options_.overrides;
             for (const std::string& key : axis.keys) overrides.push_back(key + "=" + values[n]);
             const Scene scene = options_.source->read(overrides, SceneUse::without_frames);
+            check_measured(axis, n, values[n], scene);
             if (std::optional<AxisFiles> files = axis_files(axis, values[n], scene)) {
                 values[n] = firsts[n] = axis.values.at(n) = axis_value(*files, files->paths);
                 const std::size_t first = contents.emplace(files->digest, n).first->second;
@@ -314,8 +174,8 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
         }
     }
     // Values that are good alone may contradict each other.
-    if (points_ > 0) scene_of(run(0));
-    if (points_ > 1) scene_of(run(runs() - 1));
+    if (points_ > 0) check_measured(scene_of(run(0)));
+    if (points_ > 1) check_measured(scene_of(run(runs() - 1)));
     return equals;
 }
 
@@ -440,7 +300,7 @@ std::string SweepPlan::to_toml_in(const std::filesystem::path& folder) const {
     if (is_sampled(o.design)) text += fmt::format("points = {}\n", o.points);
     text += fmt::format("replicates = {}\nseed = {}\nseeds = \"{}\"\n", o.replicates, o.seed,
                         o.common_seeds ? "common" : "per_point");
-    if (!o.layer.empty()) text += fmt::format("layer = \"{}\"\n", o.layer);
+    if (!o.layer.empty()) text += fmt::format("layer = {}\n", toml_string(o.layer));
     if (o.tracks) text += "tracks = true\n";
     text += fmt::format("clouds_every = {}\n\n[steps]\nmin = {}\nmax = {}\n", o.clouds_every, o.steps.min,
                         o.steps.max);
@@ -452,7 +312,7 @@ std::string SweepPlan::to_toml_in(const std::filesystem::path& folder) const {
         const Axis& axis = o.axes[a];
         text += "\n[[axis]]\n";
         std::vector<std::string> keys;
-        for (const std::string& key : axis.keys) keys.push_back('"' + key + '"');
+        for (const std::string& key : axis.keys) keys.push_back(toml_string(key));
         text += fmt::format("keys = [{}]\n", fmt::join(keys, ", "));
         if (axis.values.empty()) {
             text += fmt::format("range = {{ from = {}, to = {}, scale = \"{}\" }}\n", number_text(axis.from),

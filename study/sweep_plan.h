@@ -97,8 +97,10 @@ class SweepPlan {
     // Returns the text of the scene for a folder, with the keys that it was given (given_keys.h) and names of files as
     // placed_scene(): with the values of a run it is the scene of that run.
     std::string scene_text_in(const std::filesystem::path& folder) const;
-    // Returns the place of the lattice that is measured among those of the scene.
-    std::size_t measured_lattice() const;
+    // The lattice that is measured: of scene(); of a run; and whether an axis may change it.
+    const AutomatonOptions& lattice() const { return lattice_; }
+    AutomatonOptions lattice_of(const PlannedRun& run) const;
+    bool varies_lattice() const;
     std::uint64_t points() const { return points_; }
     std::uint64_t runs() const { return points_ * options_.replicates; }
     std::vector<std::string> values_of_point(std::uint64_t point) const;
@@ -118,25 +120,23 @@ class SweepPlan {
   private:
     // Returns for each value of each axis the first one of the axis that is the same.
     std::vector<std::vector<std::string>> check_axes();
+    // Returns measured_lattice() of a scene. Throws Error(usage) as that, and where clouds cannot be followed in its wind.
+    std::size_t check_measured(const Scene& scene) const;
+    // The same with the n-th value of an axis, which stands in the message.
+    void check_measured(const Axis& axis, std::size_t n, const std::string& value, const Scene& scene) const;
     // `equals`: as check_axes() returns it.
     void require_different_points(const std::vector<std::vector<std::string>>& equals) const;
     std::string identity(const std::vector<std::string>& values) const;
 
     SweepOptions options_;
     Scene scene_;
+    AutomatonOptions lattice_;
     FileStamps stamps_;  // of the files of scene(), before they were read
     std::string simulation_hash_;
     std::vector<std::map<std::string, AxisFiles>> files_;  // of each axis, by value
     std::uint64_t points_ = 0;
     std::vector<double> unit_points_;  // of sampled designs
 };
-
-// Returns a key as all ways of writing it have in common: " a[00] " is "a[0]".
-std::string canonical_key(std::string_view key);
-
-// Returns the paths of the tables and arrays that a canonical key is in, outermost first: of "a.b[0].c" these are "a", "a.b"
-// and "a.b[0]". Where one of them has a value, too, their order decides.
-std::vector<std::string> outer_keys(std::string_view key);
 
 // Returns the largest probability of activation anywhere and ever, 0 where no act can come; 1 where clouds of layers make
 // the field.

@@ -204,25 +204,18 @@ struct RunCoordinates {
     bool operator==(const RunCoordinates&) const = default;
 };
 
-RunCoordinates coordinates_of(const Scene& scene, std::size_t lattice) {
-    const AutomatonOptions options = automaton_options(scene, lattice);
-    return {options.time_step_s, options.placement.origin_m.z, options.placement.cell_size_m};
+RunCoordinates coordinates_of(const AutomatonOptions& lattice) {
+    return {lattice.time_step_s, lattice.placement.origin_m.z, lattice.placement.cell_size_m};
 }
 
 // Returns those of each run, or one where all runs have the same.
 std::vector<RunCoordinates> coordinates_of(const SweepPlan& plan, const std::vector<DoneRun>& done) {
-    const std::size_t lattice = plan.measured_lattice();
-    const auto may_move = [](const Axis& axis) {
-        return std::ranges::any_of(axis.keys, [](const std::string& key) {
-            return key.starts_with("time") || key.starts_with("lattice") || key.starts_with("layer");
-        });
-    };
-    if (std::ranges::none_of(plan.options().axes, may_move)) return {coordinates_of(plan.scene(), lattice)};
+    if (!plan.varies_lattice()) return {coordinates_of(plan.lattice())};
     std::vector<RunCoordinates> all;
     for (std::size_t n = 0; n < done.size(); ++n)
         all.push_back(n > 0 && done[n].run.point == done[n - 1].run.point
                           ? all.back()
-                          : coordinates_of(plan.scene_of(done[n].run), lattice));
+                          : coordinates_of(plan.lattice_of(done[n].run)));
     if (std::ranges::all_of(all, [&](const RunCoordinates& one) { return one == all.front(); }))
         all.resize(1);
     return all;

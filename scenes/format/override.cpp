@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The --set options: "key.path=value" on top of the scene file.
 
+#include "scenes/format/override.h"
+
 #include <charconv>
 
 #include "scenes/format/document.h"
@@ -72,12 +74,33 @@ std::string_view trimmed(std::string_view text) {
     return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
+std::vector<std::string> names_on(const ParsedPath& path) {
+    std::vector<std::string> names;
+    for (const PathStep& step : path.steps) {
+        if (!step.name.empty()) names.push_back(step.name);
+    }
+    return names;
+}
+
 std::string items_text(std::size_t count) {
     if (count == 0) return "it has no items";
     return "it has " + std::to_string(count) + (count == 1 ? " item" : " items") + ", counted from 0";
 }
 
 }  // namespace
+
+std::string key_problem(std::string_view key) {
+    const ParsedPath path = parse_path(std::string(key) + "=");
+    if (path.error_column == 0 && path.equals == key.size()) return {};
+    const std::size_t column = path.error_column > 0 ? std::size_t(path.error_column) : path.equals + 1;
+    if (column > key.size()) return "it ends before its last name or index does";
+    const std::string_view character = character_at(key, column - 1).bytes;
+    return "its character " + std::to_string(column) + " is " + enclosed(character, '`');
+}
+
+std::vector<std::string> names_of_key(std::string_view key) {
+    return names_on(parse_path(std::string(key) + "="));
+}
 
 std::optional<Node> Document::option_value(int index, std::size_t equals, const KeyForm& form) {
     const std::string_view option = origin(index).text;
@@ -111,11 +134,7 @@ void Document::set(const std::string& option, KeyForm (*describe)(const std::vec
         report({index, 1, path.error_column}, path.error, "expected --set key.path=value");
         return;
     }
-    std::vector<std::string> names;
-    for (const PathStep& step : path.steps) {
-        if (!step.name.empty()) names.push_back(step.name);
-    }
-    std::optional<Node> value = option_value(index, path.equals, describe(names));
+    std::optional<Node> value = option_value(index, path.equals, describe(names_on(path)));
     if (!value) return;
 
     Node* node = &root;

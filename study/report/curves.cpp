@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
+#include <tuple>
 
 #include "statistics/cloud_sizes.h"
 #include <fmt/format.h>
@@ -182,12 +184,12 @@ std::string profiles(const ReportData& data) {
     std::vector<double> fractions, heights;
     for (const ReportPoint* point : chosen) {
         std::vector<PlotPoint> curve;
+        const Placement place = lattice_of(data, *point).placement;
         for (std::size_t k = 0; k < point->records[0]->result.profile.size(); ++k) {
             double sum = 0;
             for (const RunRecord* record : point->records) sum += record->result.profile[k];
-            curve.push_back(
-                {sum / double(point->records.size()),
-                 data.lattice.placement.origin_m.z + (double(k) + 0.5) * data.lattice.placement.cell_size_m});
+            curve.push_back({sum / double(point->records.size()),
+                             place.origin_m.z + (double(k) + 0.5) * place.cell_size_m});
             fractions.push_back(curve.back().x);
             heights.push_back(curve.back().y);
         }
@@ -211,11 +213,16 @@ std::string sizes(const ReportData& data) {
     const auto chosen = chosen_points(
         data, [](const RunResult& r) { return !r.sizes.empty() && r.snapshots > 0; }, of);
     if (chosen.empty()) return {};
-    const double column_m2 = data.lattice.placement.cell_size_m * data.lattice.placement.cell_size_m;
     std::vector<std::vector<PlotPoint>> curves;
     std::vector<double> areas, counts;
+    // The columns of which exponents are taken, and their area: more than one where an axis changes the lattice.
+    std::set<std::tuple<std::uint64_t, std::uint64_t, double>> ranges;
     for (const ReportPoint* point : chosen) {
         std::vector<PlotPoint> curve;
+        const AutomatonOptions lattice = lattice_of(data, *point);
+        const double column_m2 = lattice.placement.cell_size_m * lattice.placement.cell_size_m;
+        const SizeRange range = default_size_range(lattice.extent);
+        ranges.emplace(range.first, range.last, column_m2);
         for (int bin = 0; bin < kSizeBins - 1; ++bin) {
             const double begin = double(size_bin_begin(bin)), width = double(size_bin_begin(bin + 1)) - begin;
             double clouds = 0, snapshots = 0;
@@ -233,10 +240,13 @@ std::string sizes(const ReportData& data) {
     }
     Figure drawing(axis_over("area of a cloud in m2", areas, true),
                    axis_over("clouds a snapshot and column of area", counts, true), 460, 340);
-    const SizeRange range = default_size_range(data.lattice.extent);
-    if (range.last >= range.first)
-        drawing.shade(double(range.first) * column_m2, double(range.last) * column_m2,
-                      "range of the exponents");
+    const auto [first, last, area_m2] = *ranges.begin();
+    std::string range = "The range of the exponents is another one at each lattice. ";
+    if (ranges.size() == 1 && last < first) range = "The box is too small for exponents. ";
+    if (ranges.size() == 1 && last >= first) {
+        range = fmt::format("Shaded: the range of the exponents, {} to {} columns. ", first, last);
+        drawing.shade(double(first) * area_m2, double(last) * area_m2, "range of the exponents");
+    }
     Legend legend;
     std::string table =
         "<table><tr><th>point</th><th>exponent, likelihood</th><th>exponent, line</th><th>fractal "
@@ -253,11 +263,7 @@ std::string sizes(const ReportData& data) {
     }
     drawing.legend(legend);
     return figure(drawing.svg("Sizes of clouds"),
-                  choice_text(chosen.size(), of) +
-                      (range.last >= range.first
-                           ? fmt::format("Shaded: the range of the exponents, {} to {} columns. ",
-                                         range.first, range.last)
-                           : "The box is too small for exponents. ") +
+                  choice_text(chosen.size(), of) + range +
                       "A finite box shifts both exponents by 0.05 to 0.1, more than their intervals say.") +
            table + "</table>\n";
 }

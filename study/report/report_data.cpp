@@ -88,7 +88,7 @@ std::string ReportPoint::name(const SweepPlan& plan) const {
 std::string ReportPoint::short_name(const SweepPlan& plan) const { return joined_name(plan, labels); }
 
 ReportData gather(const SweepPlan& plan, const Records& records) {
-    ReportData data{plan, records, automaton_options(plan.scene(), plan.measured_lattice()), {}};
+    ReportData data{plan, records, plan.lattice(), {}};
     const std::uint32_t replicates = plan.options().replicates;
     for (std::uint64_t number = 0; number < plan.points(); ++number) {
         ReportPoint point{summarise(plan, records, number), {}, {}, {}};
@@ -100,6 +100,10 @@ ReportData gather(const SweepPlan& plan, const Records& records) {
     }
     label_points(data);
     return data;
+}
+
+AutomatonOptions lattice_of(const ReportData& data, const ReportPoint& point) {
+    return data.plan.varies_lattice() ? data.plan.lattice_of(point.runs.front()) : data.lattice;
 }
 
 SweepAxis sweep_axis(const ReportData& data, std::size_t axis) {

@@ -31,11 +31,14 @@ struct ReportPoint {
 struct ReportData {
     const SweepPlan& plan;
     const Records& records;
-    AutomatonOptions lattice;  // that is measured
+    AutomatonOptions lattice;  // that is measured, of the scene without values of axes
     std::vector<ReportPoint> points;
 };
 
 ReportData gather(const SweepPlan& plan, const Records& records);
+
+// Returns the lattice that is measured at a point.
+AutomatonOptions lattice_of(const ReportData& data, const ReportPoint& point);
 
 // Returns labels of the values of an axis: numbers with as few digits as tell them apart, at least 3 and at most `most`; words
 // without quotes.

@@ -12,6 +12,7 @@
 #include <set>
 #include <string>
 
+#include "study/axis_text.h"
 #include "study/student.h"
 #include "study/sweep_file.h"
 #include "study/tables.h"

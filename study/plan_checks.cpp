@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/plan_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <string_view>
+
+#include "study/axis_text.h"
+#include "study/run_statistics.h"
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "simulation/layer_simulation.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::uint64_t kMaxPoints = 10'000'000;
+
+// Two equal values of a grid would be points with the same runs.
+void require_different(const Axis& axis, const std::string& name) {
+    std::map<std::string_view, std::size_t> places;
+    for (std::size_t n = 0; n < axis.values.size(); ++n) {
+        const auto [first, is_new] = places.emplace(axis.values[n], n);
+        if (!is_new)
+            throw Error(ErrorCode::usage,
+                        fmt::format("{}: value {} is {}, and so is value {}: expected each value once", name,
+                                    n + 1, axis.values[n], first->second + 1));
+    }
+}
+
+// Refuses keys that overlap: the last one would win, and the id of a run does not tell which that was. Throws Error(usage).
+void require_apart(const std::vector<Axis>& axes) {
+    const auto fail = [](const std::string& message) { throw Error(ErrorCode::usage, message); };
+    std::map<std::string_view, const Axis*> known;
+    for (const Axis& axis : axes) {
+        for (const std::string& key : axis.keys) {
+            const auto [first, is_new] = known.emplace(key, &axis);
+            if (is_new) continue;
+            if (first->second != &axis) fail("key `" + key + "` is in two axes");
+            fail(fmt::format("axis {}: key `{}` is in it twice", joined_keys(axis), key));
+        }
+    }
+    for (const Axis& axis : axes)
+        for (const std::string& key : axis.keys)
+            for (const std::string& outer : outer_keys(key))
+                if (known.contains(outer))
+                    fail(fmt::format(
+                        "keys `{0}` and `{1}` overlap: a value of `{0}` holds one of `{1}`, and their "
+                        "order would decide; expected one of them",
+                        outer, key));
+}
+
+}  // namespace
+
+std::string joined_keys(const Axis& axis) { return fmt::format("{}", fmt::join(axis.keys, "+")); }
+
+std::uint64_t point_count(const SweepOptions& options) {
+    if (is_sampled(options.design)) return options.points;
+    if (options.axes.empty()) return 1;
+    std::uint64_t count = 1;
+    for (const Axis& axis : options.axes) {
+        if (options.design == Design::list) return axis.values.size();
+        count *= axis.values.size();
+        if (count > kMaxPoints) return count;
+    }
+    return count;
+}
+
+void check_options(const SweepOptions& options) {
+    const auto fail = [](const std::string& message) { throw Error(ErrorCode::usage, message); };
+    constexpr std::uint64_t kLargestSeed =
+        std::numeric_limits<std::int64_t>::max();  // of the sweep's own file
+    if (options.seed > kLargestSeed)
+        fail(fmt::format("seed: {} is not from 0 to {}", options.seed, kLargestSeed));
+    if (options.replicates < 1 || options.replicates > 100'000)
+        fail(fmt::format("replicates: {} is not from 1 to 100,000", options.replicates));
+    if (options.steps.min < 20 || options.steps.max < options.steps.min || options.steps.max > kMaxSteps)
+        fail(fmt::format("steps: {}..{} is not a range from 20 steps upwards", options.steps.min,
+                         options.steps.max));
+    if (is_sampled(options.design) && options.axes.empty())
+        fail(fmt::format("design '{}': has no axis to take points from: expected --axis KEY=FROM..TO",
+                         design_name(options.design)));
+    if (!is_sampled(options.design) && options.points > 0)
+        fail(fmt::format(
+            "points: a design '{}' has the points of its values: expected no number of points, or a "
+            "sampled design",
+            design_name(options.design)));
+    if (options.steps.until && options.clouds_every == 0 && is_of_snapshots(options.steps.until->statistic))
+        fail(fmt::format(
+            "until: `{}` is of snapshots, and clouds_every = 0 takes none: expected another statistic, or "
+            "--clouds-every N",
+            options.steps.until->statistic));
+    for (const Axis& axis : options.axes) {
+        const std::string name = "axis " + joined_keys(axis);
+        if (axis.scale == Scale::integer &&
+            (axis.from != std::floor(axis.from) || axis.to != std::floor(axis.to)))
+            fail(fmt::format("{}: has a range of whole numbers from {} to {}, which are not whole", name,
+                             number_text(axis.from), number_text(axis.to)));
+        for (const std::string& key : axis.keys) {
+            if (const std::string problem = no_key_text(key); !problem.empty())
+                fail(problem + ": " + std::string(kExpectedKey));
+            if (key == "seed") fail(name + ": the seed is not an axis: give the number of replicates");
+            if (key == "time.steps") fail(name + ": the steps are not an axis: give the range of steps");
+            if (key == "time")
+                fail(name + ": has the steps in it, which are not an axis: name one of its keys");
+            if (key == "name") fail(name + ": the name of the scene changes nothing");
+            if (key == "models")
+                fail(name +
+                     ": files with base models are not an axis: name all of them in the scene, and vary the "
+                     "`models` of a sky");
+        }
+        if (is_sampled(options.design)) {
+            if (!axis.values.empty())
+                fail(fmt::format("{}: a design '{}' takes a range, not values: expected {}=FROM..TO", name,
+                                 design_name(options.design), joined_keys(axis)));
+            if (!(axis.to > axis.from)) fail(name + ": the range is empty");
+            if (axis.scale == Scale::log && !(axis.from > 0))
+                fail(name + ": a range on a log scale starts above 0");
+        } else if (axis.values.empty()) {
+            fail(fmt::format(
+                "{}: has a range without a number of values: expected {}=FROM..TO:COUNT, or --points N "
+                "for a sampled design",
+                name, joined_keys(axis)));
+        }
+        if (options.design == Design::grid) require_different(axis, name);
+        if (options.design == Design::list && axis.values.size() != options.axes.front().values.size())
+            fail(fmt::format("{}: has {} values, the first axis {}: a list takes one of each for a point",
+                             name, axis.values.size(), options.axes.front().values.size()));
+    }
+    require_apart(options.axes);
+    if (is_sampled(options.design) && (options.points < 1 || options.points > kMaxPoints))
+        fail(fmt::format("design '{}': expected points from 1 to {}", design_name(options.design),
+                         kMaxPoints));
+    if (point_count(options) > kMaxPoints) fail(fmt::format("the grid has more than {} points", kMaxPoints));
+}
+
+}  // namespace nephos

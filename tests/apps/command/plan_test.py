@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plans of `nephos sweep`: what they ask for is checked before the first run, for every value of every axis, and what is wrong
+is said where it stands."""
+
+import unittest
+
+from case import Case, LAYERED
+from sweep_test import NULL
+
+# Two layers with lattices of their own, at different heights and of cells of different sizes.
+LAYERS = """\
+seed = 3
+[time]
+steps = 20
+[[sky]]
+name = "clear"
+state = 0
+clouds = 0
+[[layer]]
+name = "low"
+skies = "clear"
+base_height_m = 500
+background = { hum = 0.0, act = 0.002, ext = 0.1 }
+lattice = { cells = [16, 16, 6], cell_size_m = 80, origin_m = [0, 0, 500] }
+[[layer]]
+name = "middle"
+skies = "clear"
+base_height_m = 3400
+background = { hum = 0.0, act = 0.02, ext = 0.1 }
+lattice = { cells = [16, 16, 6], cell_size_m = 100, origin_m = [0, 0, 3400] }
+"""
+LOW, MIDDLE = ('{name="%s",skies="clear",base_height_m=%d,background={hum=0.0,act=%s,ext=0.1},'
+               'lattice={cells=[16,16,6],cell_size_m=%d,origin_m=[0,0,%d]}}' % layer
+               for layer in (("low", 500, "0.002", 80, 500), ("middle", 3400, "0.02", 100, 3400)))
+VEIL = '{name="v",veil={form="cirrus"}}'
+
+
+class Plans(Case):
+    def setUp(self):
+        super().setUp()
+        self.null = self.write("null.toml", NULL)
+        self.layers = self.write("layers.toml", LAYERS)
+
+    def refused_plan(self, scene, *arguments, says, status=2):
+        """A plan that is refused before anything is written."""
+        result = self.refused(status, "sweep", scene, "--replicates", "1", "--steps", "20", "--out", "no", *arguments, says=says)
+        self.assertFalse((self.folder / "no").exists())
+        return result.stderr
+
+    def test_every_value_has_the_lattice_that_is_measured(self):
+        self.refused_plan(self.write("one.toml", LAYERED), "--axis", "layer[0].automaton=true,false",
+                          says="axis layer[0].automaton: value 2 is false: the scene has no layer with an automaton")
+        self.refused_plan(self.scene, "--axis", f"layer=[],[{VEIL}]",
+                          says="the scene has no layer with an automaton")
+        self.refused_plan(self.layers, "--layer", "middle", "--axis", "layer[1].name=middle,other",
+                          says='axis layer[1].name: value 2 is "other": the scene has no layer `middle` with an automaton, but low, other')
+        self.refused_plan(self.layers, "--layer", "middle", "--axis", f"layer=[{LOW},{MIDDLE}],[{LOW}]",
+                          says="no layer `middle` with an automaton, but low")
+        self.refused_plan(self.layers, "--layer", "high", says="no layer `high` with an automaton, but low, middle")
+        self.refused_plan(self.layers, says="layers.toml: the scene has the layers with an automaton low, middle: name one of them")
+        self.refused_plan(self.null, "--layer", "low", says="null.toml: the scene has no layers, and so none named `low`")
+
+    def test_tables_have_the_heights_of_the_lattice_of_each_run(self):
+        from scipy.io import netcdf_file
+        self.call("sweep", self.layers, "--layer", "middle", "--axis", f"layer=[{LOW},{MIDDLE}],[{MIDDLE},{LOW}]",
+                  "--replicates", "1", "--steps", "400..1600", "--out", "turned")
+        with netcdf_file(self.folder / "turned/series.nc", mmap=False) as file:
+            height = file.variables["height"]
+            self.assertEqual(height.dimensions, ("level",))
+            self.assertEqual([float(value) for value in height[:]], [3400 + (k + 0.5) * 100 for k in range(6)])
+        self.call("report", "turned")
+
+    def test_clouds_are_followed_in_the_winds_of_every_value(self):
+        said = self.refused_plan(self.null, "--tracks", "--axis", 'wind_field=[],[{kind="roll",x_m=0,y_m=600,radius_m=1200,speed_m_per_s=1.8}]',
+                                 says="axis wind_field: value 2 is [{")
+        self.assertIn("differs within a level", said)
+
+    def plan(self, text):
+        return self.write("plan.toml", 'scene = "null.toml"\nreplicates = 1\nsteps = { min = 20, max = 20 }\n' + text)
+
+    def test_what_is_no_key_is_refused(self):
+        for key, says in (("field.background.ext=0.3 #", "character 21 is `=`"), ("seed=7 #", "character 5 is `=`"), ("a\"b", 'character 2 is `"`'),
+                          ("field.background.", "ends before its last name"), ("wind[x].levels", "character 6 is `x`"), ("", "ends before")):
+            quoted = key.replace('"', '\\"')
+            for plan in (f'[[axis]]\nkey = "{quoted}"\nvalues = [0.1, 0.2]\n', f'[[axis]]\nkeys = ["field.background.act", "{quoted}"]\nvalues = [0.1]\n'):
+                with self.subTest(plan=plan):
+                    said = self.call("sweep", self.plan(plan), "--out", "no", status=2).stderr
+                    self.assertIn(f"`{key}` is no key of a scene: {'it ' if says.startswith('ends') else 'its '}{says}", said)
+                    self.assertIn("expected such as field.background.ext or wind[0].levels[1].height_m", said)
+        self.assertFalse((self.folder / "no").exists())
+        fit = self.write("fit.toml", """\
+scene = "null.toml"
+[[parameter]]
+key = "field.background.ext=0.3 #"
+prior = { from = 0.1, to = 0.2 }
+[[target]]
+statistic = "cover"
+value = 0.3
+sd = 0.1
+""")
+        said = self.call("fit", fit, "--out", "no", status=2).stderr
+        self.assertIn("fit.toml:3:7: error: `field.background.ext=0.3 #` is no key of a scene: its character 21 is `=`", said)
+
+    def test_a_range_says_all_of_itself(self):
+        head = '[[axis]]\nkey = "field.background.ext"\n'
+        for text, says in (("values = [0.1]\nrange = { from = 0.1, to = 0.2 }", "7:9: error: an axis has both values and a range"),
+                           ("values = [0.1]\nrange = { from = 0.1, to = 0.2, count = 3 }", "7:9: error: an axis has both values and a range"),
+                           ("range = { count = 3 }", "6:9: error: the range has no `from`"), ("range = { from = 0.1 }", "6:9: error: the range has no `to`"),
+                           ("range = { to = 0.3, count = 3 }", "6:9: error: the range has no `from`"),
+                           ("range = { from = 0.1, to = 0.3, count = 1 }", "6:41: error: `axis[0].range.count` is 1")):
+            with self.subTest(text=text):
+                said = self.call("sweep", self.plan(head + text + "\n"), "--out", "no", status=2).stderr
+                self.assertIn(f"plan.toml:{says}", said)
+        self.assertFalse((self.folder / "no").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
