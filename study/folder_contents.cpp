@@ -75,7 +75,7 @@ void require_absent(const fs::path& file, std::string_view by) {
     if (!stands_there(file)) return;
     throw Error(
         ErrorCode::usage,
-        fmt::format("{}: is there, but {} did not write it, and would replace it: give another folder",
+        fmt::format("{}: is there, but {} did not write it, and would replace it: write to another place",
                     file.string(), by));
 }
 

@@ -4,7 +4,9 @@
 
 #include "study/report.h"
 
+#include <filesystem>
 #include <memory>
+#include <system_error>
 
 #include "study/folder_contents.h"
 #include "study/sweep.h"
@@ -25,6 +27,13 @@ struct ReportArguments {
     WorkArguments work;
 };
 
+// Returns whether a file is there and holds nothing, as mktemp leaves it. Throws nothing.
+bool is_empty_file(const std::filesystem::path& path) {
+    std::error_code error;
+    return std::filesystem::is_regular_file(path, error) && std::filesystem::file_size(path, error) == 0 &&
+           !error;
+}
+
 int report(const ReportArguments& a) {
     const ThreadLimit limit(1);
     const SweepPlan plan = plan_of_folder(a.folders.front());
@@ -39,7 +48,7 @@ int report(const ReportArguments& a) {
                         "merge` made are shown by `nephos report` of the folders that were merged");
     const std::filesystem::path out = a.out.empty() ? std::filesystem::path(a.folders.front()) / "report.html"
                                                     : std::filesystem::path(a.out);
-    if (a.out.empty()) require_own(out, kReportBeginning, "`nephos report`");
+    if (!is_empty_file(out)) require_own(out, kReportBeginning, "`nephos report`");
     write_report(plan, records, out);
     for (const std::string& problem : records.problems()) print_error(problem);
     if (!a.work.quiet)

@@ -164,6 +164,19 @@ class Report(Case):
         self.sweep("a")
         self.refused(3, "report", "a", "--out", "null.toml/x.html", says="null.toml")
 
+    def test_files_of_others_are_not_replaced(self):
+        """An earlier page is, and an empty file, as mktemp makes it."""
+        self.sweep("a")
+        records = self.folder / "a/shards/0000-of-0001.jsonl"
+        for name in (records, self.write("notes.txt", "notes of mine\n"), self.folder / "a/runs.csv"):
+            before = pathlib.Path(name).read_bytes()
+            self.refused(2, "report", "a", "--out", name, says=f"{name}: is there, but `nephos report` did not write it")
+            self.assertEqual(pathlib.Path(name).read_bytes(), before)
+        empty = self.write("empty.html", "")
+        for name in (empty, empty):
+            self.call("report", "a", "--out", name)
+            self.assertTrue(pathlib.Path(name).read_text().startswith("<!DOCTYPE html>"))
+
     def test_figures_can_be_read(self):
         """Texts of figures are inside of them, on no other text, and curves are under no legend; values are short."""
         self.sweep("a", axes=("field.background.ext+field.background.hum=log:1e-3..4e-3:5", "field.background.act=log:1e-4..1e-2:4"))

@@ -627,7 +627,8 @@ sd = 0.05
             self.call("sweep", self.null, *axis, folder)
         (self.folder / "mixed/report.html").write_text("mine")
         self.refused(2, "report", "mixed", says="mixed/report.html: is there")
-        self.call("report", "mixed", "--out", "mixed/report.html")
+        self.refused(2, "report", "mixed", "--out", "mixed/report.html", says="mixed/report.html: is there")
+        (self.folder / "mixed/report.html").unlink()
         self.call("report", "mixed")
         # Files beside the records, and such as have their names.
         texts = {"train-000.jsonl": '{"my": 1}\n{"my": 2}\n', "train-000.series": "mine"}
