@@ -6,7 +6,7 @@
 #include <system_error>
 #include <utility>
 
-#include "study/records.h"
+#include "study/shard_files.h"
 #include "study/sweep_plan.h"
 #include <fmt/format.h>
 

@@ -3,19 +3,18 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <span>
 
 #include "study/folder_contents.h"
 #include "study/packed_series.h"
+#include "study/record_lines.h"
+#include "study/shard_files.h"
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <sys/file.h>
 
-#include "automaton/checkpoint.h"
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
@@ -30,40 +29,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::string_view kHashField = ",\"xxh3\":\"";
 constexpr double kFlushAfter_s = 1;
 constexpr int kFlushAfter = 64;
 constexpr std::uint64_t kMostBytes = std::uint64_t(1) << 50;  // of a file of series: no disk holds more
-
-std::string hash_text(std::string_view text) { return hash_of_bytes(std::as_bytes(std::span(text))).hex(); }
-
-// Closes an object with the hash of all before.
-std::string sealed(const Json& json) {
-    std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-    text.pop_back();
-    const std::string hash = hash_text(text);
-    return text + std::string(kHashField) + hash + "\"}\n";
-}
-
-bool is_whole(std::string_view line) {
-    const std::size_t at = line.rfind(kHashField);
-    if (at == line.npos || !line.ends_with("\"}")) return false;
-    const std::size_t begin = at + kHashField.size();
-    return line.substr(begin, line.size() - 2 - begin) == hash_text(line.substr(0, at));
-}
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-double number_of(const Json& json) { return json.is_number() ? json.get<double>() : std::nan(""); }
-
-Json head(const PlannedRun& run, std::string_view status) {
-    return {{"run", run.id},
-            {"status", status},
-            {"statistics_version", NEPHOS_STATISTICS_VERSION},
-            {"random_stream_version", kRandomStreamVersion},
-            {"replicate", run.replicate},
-            {"seed", std::to_string(run.seed)},
-            {"values", run.values}};
-}
 
 // Throws Error(usage) on a record of another version, with a cure that the command which reads it has.
 void require_this_version(const Json& json, const std::filesystem::path& shard, RecordsFor use) {
@@ -83,54 +51,6 @@ void require_this_version(const Json& json, const std::filesystem::path& shard, 
                                               folder)));
 }
 
-Regime regime_of(const std::string& name) {
-    for (int n = 0; n <= int(Regime::not_steady); ++n)
-        if (regime_name(Regime(n)) == name) return Regime(n);
-    throw Error(ErrorCode::io, "'" + name + "' is not a regime");
-}
-
-// Returns the text where it is base64, so that a page may contain it as it is; nothing otherwise.
-std::string base64_only(std::string text) {
-    const bool good = std::ranges::all_of(text, [](char c) {
-        return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '+' ||
-               c == '/' || c == '=';
-    });
-    return good ? text : std::string();
-}
-
-RunRecord record_of(const Json& json) {
-    RunRecord record;
-    record.id = json.at("run").get<std::string>();
-    record.failed = json.at("status") != "done";
-    if (record.failed) {
-        record.message = json.at("message").get<std::string>();
-        return record;
-    }
-    RunResult& result = record.result;
-    result.regime = regime_of(json.at("regime").get<std::string>());
-    result.steps = json.at("steps").get<std::uint64_t>();
-    result.warm_up = json.at("warm_up_steps").get<std::uint64_t>();
-    result.used = json.at("used_steps").get<std::uint64_t>();
-    result.period = json.at("period_steps").get<std::uint64_t>();
-    for (std::size_t n = 0; n < kStatistics.size(); ++n) {
-        const Json& s = json.at("statistics").at(std::string(kStatistics[n].name));
-        result.statistics[n] = {number_of(s.at(0)), number_of(s.at(1)), number_of(s.at(2)),
-                                number_of(s.at(3)), number_of(s.at(4))};
-    }
-    result.profile = json.at("profile").get<std::vector<double>>();
-    result.sizes = json.at("sizes").get<std::vector<std::uint64_t>>();
-    result.snapshots = json.at("snapshots").get<std::uint64_t>();
-    if (const auto tracks = json.find("tracks"); tracks != json.end())
-        for (std::size_t n = 0; n < kTrackColumns.size(); ++n)
-            result.tracks.push_back(number_of(tracks->at(n)));
-    result.state_hash = json.at("state_hash").get<std::string>();
-    record.series_offset = json.at("series_offset").get<std::uint64_t>();
-    record.series_bytes = json.at("series_bytes").get<std::uint64_t>();
-    if (const auto thumbnail = json.find("thumbnail"); thumbnail != json.end())
-        result.thumbnail = base64_only(thumbnail->get<std::string>());
-    return record;
-}
-
 [[noreturn]] void fail(const std::filesystem::path& path, int error) {
     throw Error(ErrorCode::io, path.string() + ": cannot write: " + std::strerror(error));
 }
@@ -148,86 +68,53 @@ void append(const std::filesystem::path& path, const Descriptor& file, std::span
     size += content.size();
 }
 
-// Returns true for "0003-of-0012.jsonl".
-bool is_name_of_shard(const std::filesystem::path& path) {
-    const std::string name = path.stem().string();
-    const std::size_t middle = name.find("-of-");
-    const auto is_number = [](std::string_view text) {
-        return text.size() >= 4 && text.find_first_not_of("0123456789") == text.npos;
-    };
-    return path.extension() == ".jsonl" && middle != name.npos &&
-           is_number(std::string_view(name).substr(0, middle)) &&
-           is_number(std::string_view(name).substr(middle + 4));
+bool has_impossible_numbers(const RunRecord& record) {
+    const std::uint64_t values = kSeries.size() * (std::min(record.result.steps, kMaxSteps) + 1);
+    return record.result.steps > kMaxSteps || record.series_offset > kMostBytes ||
+           record.series_bytes > kMostBytes ||
+           (!record.failed && values * sizeof(float) > kMostUnpacked * record.series_bytes + 64);
 }
 
-// Throws Error(usage) where the file is there and begins as no shard does, nor as the first part of one.
-void require_own_records(const std::filesystem::path& path) {
-    constexpr std::string_view kRecord = "{\"run\":\"";
-    const std::string beginning = read_beginning(path, kRecord.size());
-    if (!kRecord.starts_with(beginning)) require_own(path, kRecord, "a sweep");
+// Of a record of an earlier version, whose series have no hash.
+Error damaged_series(const std::filesystem::path& path, const RunRecord& record, std::string_view what) {
+    return {ErrorCode::io,
+            fmt::format("{}: at byte {}, of run {}: {}; `nephos sweep` with --overwrite computes it again",
+                        path.string(), record.series_offset, record.id, what)};
 }
 
-std::vector<std::filesystem::path> files_of_shards(const std::filesystem::path& folder) {
-    std::vector<std::filesystem::path> files;
-    std::error_code error;
-    std::filesystem::directory_iterator at(folder / "shards", error), end;
-    if (error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory) return files;
-    for (; !error && at != end; at.increment(error))
-        if (is_name_of_shard(at->path())) files.push_back(at->path());
-    if (error) throw ReadFailure(folder / "shards", error.message());
-    std::ranges::sort(files);
-    return files;
-}
+// A record that was read, and the byte of the shard where it begins.
+struct PlacedRecord {
+    std::uint64_t at = 0;
+    RunRecord record;
+    bool is_sound = true;
+};
 
-std::filesystem::path shard_path(const std::filesystem::path& folder, std::uint32_t number,
-                                 std::uint32_t of) {
-    return folder / "shards" / fmt::format("{:04}-of-{:04}.jsonl", number, of);
-}
-
-void lock(const std::filesystem::path& path, const Descriptor& file) {
-    if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-        throw Error(ErrorCode::io, path.string() +
-                                       ": another sweep is writing this shard: wait for its end, or choose "
-                                       "another --out or --shard");
+// Returns those whose packed series are not as they were written, in the order of the file of series, which is read once and
+// forwards. Throws ReadFailure. Precondition: the file holds the bytes that the records name.
+std::vector<const PlacedRecord*> with_damaged_series(const std::vector<PlacedRecord>& records,
+                                                     const std::filesystem::path& path) {
+    std::vector<const PlacedRecord*> order, damaged;
+    for (const PlacedRecord& one : records)
+        if (!one.record.series_xxh3.empty()) order.push_back(&one);
+    if (order.empty()) return damaged;
+    std::ranges::sort(order, {}, [](const PlacedRecord* one) { return one->record.series_offset; });
+    std::ifstream stream = open_stream(path);
+    std::string packed;
+    std::uint64_t at = 0;
+    for (const PlacedRecord* one : order) {
+        // Seeking throws away what is read ahead.
+        if (at != one->record.series_offset) stream.seekg(std::streamoff(one->record.series_offset));
+        packed.resize(one->record.series_bytes);
+        stream.read(packed.data(), std::streamsize(packed.size()));
+        check_reading(stream, path);
+        at = one->record.series_offset + packed.size();
+        if (!stream || hash_text(packed) != one->record.series_xxh3) damaged.push_back(one);
+        stream.clear();
+    }
+    return damaged;
 }
 
 }  // namespace
-
-std::string record_line(const PlannedRun& run, const RunResult& result, std::uint64_t series_offset,
-                        std::uint64_t series_bytes) {
-    Json json = head(run, "done");
-    json["regime"] = regime_name(result.regime);
-    json["steps"] = result.steps;
-    json["warm_up_steps"] = result.warm_up;
-    json["used_steps"] = result.used;
-    json["period_steps"] = result.period;
-    Json statistics = Json::object();
-    for (std::size_t n = 0; n < kStatistics.size(); ++n) {
-        const SeriesMean& s = result.statistics[n];
-        statistics[std::string(kStatistics[n].name)] = {number(s.mean), number(s.error), number(s.deviation),
-                                                        number(s.tau), number(s.effective)};
-    }
-    json["statistics"] = std::move(statistics);
-    json["profile"] = result.profile;
-    json["sizes"] = result.sizes;
-    json["snapshots"] = result.snapshots;
-    if (!result.tracks.empty()) {
-        Json tracks = Json::array();
-        for (const double value : result.tracks) tracks.push_back(number(value));
-        json["tracks"] = std::move(tracks);
-    }
-    json["state_hash"] = result.state_hash;
-    json["series_offset"] = series_offset;
-    json["series_bytes"] = series_bytes;
-    if (!result.thumbnail.empty()) json["thumbnail"] = result.thumbnail;
-    return sealed(json);
-}
-
-std::string failure_line(const PlannedRun& run, std::string_view message) {
-    Json json = head(run, "failed");
-    json["message"] = message;
-    return sealed(json);
-}
 
 std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesystem::path& path,
                                                             RecordsFor use) {
@@ -246,10 +133,11 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
         if (problem.empty())
             problem = fmt::format("{}: the record at byte {} {}", path.string(), place, message);
     };
+    std::vector<PlacedRecord> found;
     bool torn = false;
     for (std::string line; std::getline(stream, line); at += line.size() + 1) {
         if (torn) note(bytes, "is damaged, but others follow it");
-        torn = stream.eof() || !is_whole(line);
+        torn = stream.eof() || !is_whole_record(line);
         if (torn) continue;
         bytes = at + line.size() + 1;
         try {
@@ -257,10 +145,7 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
             require_this_version(json, path, use);
             RunRecord record = record_of(json);
             record.shard = shard;
-            const std::uint64_t values = kSeries.size() * (std::min(record.result.steps, kMaxSteps) + 1);
-            if (record.result.steps > kMaxSteps || record.series_offset > kMostBytes ||
-                record.series_bytes > kMostBytes ||
-                (!record.failed && values * sizeof(float) > kMostUnpacked * record.series_bytes + 64)) {
+            if (has_impossible_numbers(record)) {
                 note(at, "has impossible numbers");
                 continue;
             }
@@ -273,19 +158,35 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
                 }
                 series = std::max(series, end);
             }
-            const auto known = runs_.find(record.id);
-            if (known == runs_.end()) {
-                runs_.emplace(record.id, std::move(record));
-            } else if (!record.failed || known->second.failed) {
-                known->second = std::move(record);
-            }
+            found.push_back({at, std::move(record)});
         } catch (const nlohmann::json::exception&) {
             note(at, "is not of a run");
+        } catch (const Error& wrong) {
+            if (wrong.code() != ErrorCode::io) throw;
+            note(at, fmt::format("is not of a run: {}", wrong.what()));
         }
     }
+    for (const PlacedRecord* one : with_damaged_series(found, series_path)) {
+        note(one->at,
+             fmt::format("is of run {}, whose packed series are damaged, at byte {} of {}", one->record.id,
+                         one->record.series_offset, series_path.filename().string()));
+        found[std::size_t(one - found.data())].is_sound = false;
+    }
+    for (PlacedRecord& one : found)
+        if (one.is_sound) take(std::move(one.record));
     check_reading(stream, path);
     if (!problem.empty()) problems_.push_back(problem);
     return {bytes, series};
+}
+
+void Records::take(RunRecord record) {
+    const auto known = runs_.find(record.id);
+    if (known == runs_.end()) {
+        std::string id = record.id;
+        runs_.emplace(std::move(id), std::move(record));
+    } else if (!record.failed || known->second.failed) {
+        known->second = std::move(record);
+    }
 }
 
 Records Records::read(const std::vector<std::filesystem::path>& folders, RecordsFor use) {
@@ -335,61 +236,13 @@ std::vector<float> Records::series(const RunRecord& record) const {
             ::pread(file.get(), packed.data() + had, packed.size() - had, off_t(record.series_offset + had));
         if (got < 0 && errno == EINTR) continue;
         if (got < 0) throw ReadFailure(path, std::strerror(errno));
-        if (got == 0)
-            throw Error(ErrorCode::io, path.string() + ": does not hold the series that the records name");
+        if (got == 0) throw damaged_series(path, record, "they are cut");
         had += std::size_t(got);
     }
     try {
         return unpack_series(packed, kSeries.size() * (record.result.steps + 1));
     } catch (const Error& error) {
-        throw Error(ErrorCode::io,
-                    fmt::format("{}: at byte {}: {}", path.string(), record.series_offset, error.what()));
-    }
-}
-
-void remove_shards(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of) {
-    std::vector<std::filesystem::path> files = files_of_shards(folder);
-    if (of > 1)
-        std::erase_if(files, [&](const auto& path) { return path != shard_path(folder, number, of); });
-    std::vector<Descriptor> locks;
-    for (const std::filesystem::path& path : files) {
-        locks.push_back(open_regular_file(path, O_RDWR | O_NOFOLLOW));
-        lock(path, locks.back());
-        require_own_records(path);
-    }
-    for (const std::filesystem::path& path : files) {
-        // Records last: series without them are nobody's.
-        for (const std::filesystem::path& file :
-             {std::filesystem::path(path).replace_extension(".series"), path}) {
-            std::error_code error;
-            std::filesystem::remove(file, error);
-            if (error) throw Error(ErrorCode::io, file.string() + ": cannot remove: " + error.message());
-        }
-    }
-}
-
-bool has_shards(const std::filesystem::path& folder) { return !files_of_shards(folder).empty(); }
-
-FolderGuard::FolderGuard(const std::filesystem::path& folder) : folder_(folder) {
-    const std::filesystem::path shards = folder / "shards";
-    create_folders(shards);
-    // A file that is open for writing: NFS locks no folders, and no others exclusively.
-    file_ = open_regular_file(shards / "lock", O_RDWR | O_CREAT | O_NOFOLLOW).release();
-    // Where a file system has no locks, nothing is kept apart, as with those of shards.
-    while (::flock(file_, LOCK_EX) != 0 && errno == EINTR) {
-    }
-}
-
-FolderGuard::~FolderGuard() { ::close(file_); }
-
-void FolderGuard::require_no_writer() const {
-    for (const std::filesystem::path& path : files_of_shards(folder_)) {
-        const Descriptor file = open_regular_file(path, O_RDONLY);
-        if (::flock(file.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-            throw Error(ErrorCode::io,
-                        path.string() +
-                            ": a sweep of another plan is writing into this folder: wait for its "
-                            "end, or choose another --out");
+        throw damaged_series(path, record, error.what());
     }
 }
 
@@ -415,12 +268,12 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
     constexpr int kOwn = O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW;
     files_->records = open_regular_file(path_, kOwn);
     files_->series = open_regular_file(series_path_, kOwn);
-    lock(path_, files_->records);
+    lock_shard(path_, files_->records.get());
     require_own_records(path_);
     // A copy of the sweep may be made of links. Whoever holds the lock has no other writer.
     if (separate_from_links(path_)) {
         files_->records = open_regular_file(path_, kOwn);
-        lock(path_, files_->records);
+        lock_shard(path_, files_->records.get());
     }
     if (separate_from_links(series_path_)) files_->series = open_regular_file(series_path_, kOwn);
     Records records;
@@ -445,7 +298,7 @@ Shard::~Shard() {
 
 void Shard::add(const PlannedRun& run, const RunResult& result) {
     const std::string packed = pack_series(result.series, result.scales);
-    lines_ += record_line(run, result, series_bytes_ + series_.size(), packed.size());
+    lines_ += record_line(run, result, series_bytes_ + series_.size(), packed);
     series_ += packed;
     flush_if_due();
 }

@@ -31,11 +31,12 @@ struct RunRecord {
     RunResult result;         // without its series
     std::uint32_t shard = 0;  // place in the list of files that were read
     std::uint64_t series_offset = 0, series_bytes = 0;
+    std::string series_xxh3 = {};  // of the packed series; empty of a record that an earlier version wrote
 };
 
 // Returns a record as its line, with the newline; its packed series stand at a place of the shard's file of series.
 std::string record_line(const PlannedRun& run, const RunResult& result, std::uint64_t series_offset,
-                        std::uint64_t series_bytes);
+                        std::string_view series);
 std::string failure_line(const PlannedRun& run, std::string_view message);
 
 // What the records are read for: it decides what helps against those of another version.
@@ -52,7 +53,8 @@ class Records {
     static Records read(const std::vector<std::filesystem::path>& folders,
                         RecordsFor use = RecordsFor::running);
 
-    // "PATH: what is wrong", one a file; the torn last record of a shard is no problem.
+    // "PATH: what is wrong", one a file; the torn last record of a shard is no problem. A run whose packed series are not as
+    // they were written is left out.
     const std::vector<std::string>& problems() const { return problems_; }
 
     const RunRecord* find(const std::string& id) const;
@@ -73,35 +75,13 @@ class Records {
     // when it cannot be opened.
     std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path, RecordsFor use);
 
+    // Keeps the last record of a run, but none of a failure where there is another.
+    void take(RunRecord record);
+
     std::unordered_map<std::string, RunRecord> runs_;
     std::vector<std::string> problems_;
     std::vector<SeriesFile> files_;  // by RunRecord::shard
     std::size_t folders_ = 0;        // that were begun
-};
-
-// Returns whether a folder has a file of records, also one that is empty yet. Throws Error(io). Thread-safe.
-bool has_shards(const std::filesystem::path& folder);
-
-// Removes the shards of a folder, or only the one of a number where `of` is above 1. Throws Error(io), also when another
-// process writes one of them; then none is removed.
-void remove_shards(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of);
-
-// Keeps other processes from beginning a sweep in a folder, or from replacing its plan, while it lives; waits for one that
-// does. Makes the folder. Throws Error(io).
-class FolderGuard {
-  public:
-    explicit FolderGuard(const std::filesystem::path& folder);
-
-    ~FolderGuard();
-    FolderGuard(const FolderGuard&) = delete;
-    FolderGuard& operator=(const FolderGuard&) = delete;
-
-    // Throws Error(io) when a process writes a shard of the folder, also this one.
-    void require_no_writer() const;
-
-  private:
-    std::filesystem::path folder_;
-    int file_ = -1;  // descriptor of the file that is locked
 };
 
 // A shard while its process appends to it.

@@ -9,6 +9,8 @@
 #include <span>
 
 #include "study/folder_contents.h"
+#include "study/folder_guard.h"
+#include "study/shard_files.h"
 #include "study/sweep_file.h"
 #include "study/workers.h"
 #include <fcntl.h>

@@ -480,6 +480,8 @@ LostRuns runs_lost(const SweepPlan& plan, const Records& records, const std::fil
 
 std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
                            const std::filesystem::path& folder) {
+    // First, for damaged series alone can end it: the tables before it then stay as they are.
+    write_series(plan, records, folder / "series.nc");
     write_runs(plan, records, folder / "runs.csv");
     write_points(plan, records, folder / "points.csv");
     const std::uint64_t missing = write_failures(plan, records, folder / "failures.csv");
@@ -487,7 +489,6 @@ std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
         write_tracks(plan, records, folder / "tracks.csv");
     else
         remove_table(folder / "tracks.csv");  // of another plan
-    write_series(plan, records, folder / "series.nc");
     write_manifest(plan, records, folder / "manifest.json");
     return missing;
 }

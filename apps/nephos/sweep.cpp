@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "study/folder_contents.h"
+#include "study/folder_guard.h"
+#include "study/shard_files.h"
 #include "study/sweep_file.h"
 #include "study/tables.h"
 #include <fmt/format.h>

@@ -97,8 +97,9 @@ BenchRow series_row() {
     const auto [ours, other] = interleave(
         kRounds,
         [&] {
-            series = pack_series(run.series, run.scales).size();
-            record = record_line(planned, run, 0, series).size();
+            const std::string packed = pack_series(run.series, run.scales);
+            series = packed.size();
+            record = record_line(planned, run, 0, packed).size();
         },
         [&] { step_alone(scene); }, Clock::processor);
     // The tables keep the series once more, as they are.

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/folder_guard.h"
+
+#include <cerrno>
+
+#include "study/shard_files.h"
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "core/descriptor.h"
+#include "core/error.h"
+#include "core/paths.h"
+
+namespace nephos {
+
+FolderGuard::FolderGuard(const std::filesystem::path& folder) : folder_(folder) {
+    const std::filesystem::path shards = folder / "shards";
+    create_folders(shards);
+    // A file that is open for writing: NFS locks no folders, and no others exclusively.
+    file_ = open_regular_file(shards / "lock", O_RDWR | O_CREAT | O_NOFOLLOW).release();
+    // Where a file system has no locks, nothing is kept apart, as with those of shards.
+    while (::flock(file_, LOCK_EX) != 0 && errno == EINTR) {
+    }
+}
+
+FolderGuard::~FolderGuard() { ::close(file_); }
+
+void FolderGuard::require_no_writer() const {
+    for (const std::filesystem::path& path : files_of_shards(folder_)) {
+        const Descriptor file = open_regular_file(path, O_RDONLY);
+        if (::flock(file.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+            throw Error(ErrorCode::io,
+                        path.string() +
+                            ": a sweep of another plan is writing into this folder: wait for its "
+                            "end, or choose another --out");
+    }
+}
+
+}  // namespace nephos
