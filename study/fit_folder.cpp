@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/fit_folder.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "study/folder_contents.h"
 #include "study/placed_scene.h"
+#include "study/plan_memory.h"
 #include "study/tables.h"
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -157,7 +159,10 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
     // Bad ends of a prior are found before the first run.
     std::vector<std::vector<double>> ends;
     for (const double unit : {0.0, 1.0}) ends.emplace_back(options.problem.parameters.size(), unit);
-    const std::string simulation_hash = plan_of(options, ends).simulation_hash();
+    const SweepPlan plan_of_ends = plan_of(options, ends);
+    require_memory_for(plan_of_ends,
+                       int(std::min<std::uint64_t>(std::uint64_t(job.workers), options.problem.runs)));
+    const std::string& simulation_hash = plan_of_ends.simulation_hash();
     const Simulate simulate = [&](int wave, const std::vector<std::vector<double>>& points) {
         const SweepPlan plan = plan_of(options, points);
         if (plan.simulation_hash() != simulation_hash)

@@ -11,6 +11,7 @@
 
 #include "study/folder_contents.h"
 #include "study/folder_guard.h"
+#include "study/plan_memory.h"
 #include "study/shard_files.h"
 #include "study/sweep_file.h"
 #include "study/tables.h"
@@ -24,7 +25,6 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "simulation/layer_simulation.h"
-#include "simulation/memory.h"
 
 namespace nephos {
 namespace {
@@ -185,14 +185,6 @@ void write_and_print_tables(const SweepPlan& plan, const Records& records, const
                     folder, report));
 }
 
-void check_memory_of(const SweepPlan& plan, int workers) {
-    std::size_t bytes = 0;
-    for (std::size_t n = 0; n < lattice_count(plan.scene()); ++n)
-        if (plan.scene().layers.empty() || !plan.scene().layers[n].is_veil)
-            bytes += Automaton::memory_bytes(automaton_options(plan.scene(), n));
-    require_memory(bytes * std::size_t(workers), fmt::format("{} workers with a run each", workers));
-}
-
 int sweep(const SweepArguments& a) {
     const ThreadLimit limit(1);  // parallelism is between runs; and workers are forked from one thread
     const SweepPlan plan(options_of(a));
@@ -234,7 +226,8 @@ int sweep(const SweepArguments& a) {
         output.line(next);
         return 0;
     }
-    check_memory_of(plan, job.workers);
+    require_memory_for(plan, int(std::min<std::uint64_t>(std::uint64_t(job.workers),
+                                                         std::max<std::uint64_t>(plan.runs(), 1))));
     if (!a.work.quiet && !a.work.json) print_note(describe(plan));
     std::unique_ptr<ProgressBar> bar;
     defer_signals();

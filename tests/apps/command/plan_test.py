@@ -4,7 +4,7 @@ is said where it stands."""
 
 import unittest
 
-from case import Case, LAYERED
+from case import Case, LAYERED, SANITIZED, limit_addresses
 from sweep_test import NULL
 
 # Two layers with lattices of their own, at different heights and of cells of different sizes.
@@ -111,6 +111,39 @@ sd = 0.1
             with self.subTest(text=text):
                 said = self.call("sweep", self.plan(head + text + "\n"), "--out", "no", status=2).stderr
                 self.assertIn(f"plan.toml:{says}", said)
+        self.assertFalse((self.folder / "no").exists())
+
+    @unittest.skipIf(SANITIZED, "addresses cannot be limited")
+    def test_the_largest_run_fits_into_memory(self):
+        """Whichever value of whichever axis it has; nothing is written before."""
+        limit = {"preexec_fn": lambda: limit_addresses(2 << 30)}
+        cells = "lattice.cells=[32,32,10],[4096,4096,512]"
+        for arguments, says in ((("--axis", cells), "a run of lattice.cells=[4096, 4096, 512] takes about "),
+                                (("--axis", "field.background.ext=0.1,0.2", "--axis", cells, "--set", "lattice.cells=[16,16,4]"),
+                                 "a run of lattice.cells=[4096, 4096, 512] takes about "),
+                                (("--axis", "lattice.cells[0]=64,4096", "--axis", "lattice.cells[1]=64,4096", "--axis", "lattice.cells[2]=10,512", "-j", "2"),
+                                 "2 workers with a run each of lattice.cells[0]=4096, lattice.cells[1]=4096, lattice.cells[2]=512 takes"),
+                                (("--axis", "lattice.cells[2]=integer:10..512", "--set", "lattice.cells=[4096,4096,10]", "--points", "2"), "a run of lattice.cells[2]=512 takes")):
+            with self.subTest(arguments=arguments):
+                result = self.call("sweep", self.null, "--replicates", "1", "--steps", "20", "--out", "no", *(() if "-j" in arguments else ("-j", "1")), *arguments,
+                                   status=2, **limit)
+                self.assertIn(says, result.stderr)
+                self.assertIn("are all there is", result.stderr)
+        # Of a list each value meets one of the others alone.
+        self.call("sweep", self.null, "--replicates", "1", "--steps", "20", "--design", "list", "--axis", "lattice.cells[0]=4096,16", "--axis",
+                  "lattice.cells[1]=16,4096", "--axis", "lattice.cells[2]=10,12", "-j", "1", "--out", "list", **limit)
+        fit = self.write("fit.toml", """\
+scene = "null.toml"
+set = ["lattice.cells=[4096,4096,512]"]
+[[parameter]]
+key = "field.background.ext"
+prior = { from = 0.1, to = 0.2 }
+[[target]]
+statistic = "cover"
+value = 0.3
+sd = 0.1
+""")
+        self.refused(2, "fit", fit, "--out", "no", "-j", "1", says="a run takes about", **limit)
         self.assertFalse((self.folder / "no").exists())
 
 
