@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <unordered_set>
 
 #include "study/run_statistics.h"
@@ -24,7 +25,22 @@ constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr std::uint64_t kMostValues = 100'000;
 const std::vector<std::string_view> kScaleNames{"linear", "log", "integer"};
 
+PlanPlace plan_place(const Place& place) { return {place.line, place.column}; }
+
+// Where a key stands in a file; nowhere, where it is missing.
+PlanPlace place_in(TomlTable& table, std::string_view key) {
+    return table.has(key) ? plan_place(table.place(key)) : PlanPlace{};
+}
+
+std::vector<PlanPlace> places_in(TomlTable& table, std::string_view key) {
+    std::vector<PlanPlace> places;
+    for (const Place& place : table.item_places(key)) places.push_back(plan_place(place));
+    return places;
+}
+
 void read_range(TomlTable& range, Axis& axis) {
+    axis.places.from = place_in(range, "from");
+    axis.places.to = place_in(range, "to");
     const std::optional<double> from = range.number("from", -kLargest, kLargest),
                                 to = range.number("to", -kLargest, kLargest);
     axis.scale = Scale(range.word("scale", kScaleNames).value_or(0));
@@ -56,9 +72,13 @@ void read_axis(TomlTable& table, const std::filesystem::path& folder, SweepOptio
     axis.folder = folder;
     if (const auto key = table.text("key")) axis.keys = {*key};
     for (std::string& key : table.texts("keys")) axis.keys.push_back(std::move(key));
+    axis.places.keys = places_in(table, "key");
+    for (const PlanPlace& place : places_in(table, "keys")) axis.places.keys.push_back(place);
     if (axis.keys.empty())
         table.report("key", "an axis has no key", "expected key = \"field.background.ext\", or keys = [...]");
     axis.values = table.values("values");
+    axis.places.values = places_in(table, "values");
+    axis.places.range = place_in(table, "range");
     table.table("range", [&](TomlTable& range) { read_range(range, axis); });
     if (table.has("values") && table.has("range"))
         table.report("range", "an axis has both values and a range", "expected one of them");
@@ -132,12 +152,14 @@ std::string_view trimmed(std::string_view text) {
 
 SweepOptions read_sweep_text(std::string text, const std::filesystem::path& path) {
     SweepOptions options;
+    options.file = std::make_shared<const PlanFile>(PlanFile{path.string(), text});
     read_toml_text(std::move(text), path.string(), [&](TomlTable& table) {
         const std::optional<std::string> scene = table.text("scene");
         if (!scene && !table.has("scene"))
             table.report("scene", "the sweep has no scene", "expected scene = \"FILE.toml\"");
         options.scene_file = path.parent_path() / scene.value_or("");
         options.overrides = table.texts("set");
+        options.override_places = places_in(table, "set");
         options.design = Design(table.word("design", {"grid", "list", "random", "latin_hypercube", "sobol"})
                                     .value_or(std::size_t(Design::grid)));
         options.points = table.integer("points", 1, 10'000'000).value_or(0);
@@ -150,6 +172,8 @@ SweepOptions read_sweep_text(std::string text, const std::filesystem::path& path
             int(table.integer("clouds_every", 0, 1'000'000).value_or(std::uint64_t(options.clouds_every)));
         options.tracks = table.flag("tracks").value_or(false);
         options.layer = table.text("layer").value_or("");
+        options.layer_place = place_in(table, "layer");
+        options.tracks_place = place_in(table, "tracks");
         table.table("steps", [&](TomlTable& steps) { read_steps(steps, options.steps); });
         const std::filesystem::path folder = path.parent_path() / table.text("folder").value_or("");
         table.tables("axis", [&](TomlTable& axis) { read_axis(axis, folder, options); });

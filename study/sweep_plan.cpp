@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <span>
@@ -14,6 +15,7 @@
 #include "study/measured_lattice.h"
 #include "study/placed_scene.h"
 #include "study/plan_checks.h"
+#include "study/plan_errors.h"
 #include <fmt/format.h>
 
 #include "automaton/checkpoint.h"
@@ -47,6 +49,28 @@ std::string value_at(const Axis& axis, double unit) {
     return number_text(axis.from + unit * (axis.to - axis.from));
 }
 
+// Throws Error(usage) where clouds cannot be followed: the wind, with its files, differs within a level.
+void require_same_wind(const Scene& scene, std::size_t lattice) {
+    if (!is_profile(automaton_options(with_files(scene), lattice).wind.fields))
+        throw Error(ErrorCode::usage,
+                    "the scene has a wind that differs within a level, and clouds are followed only in one "
+                    "that is the "
+                    "same all over each level: leave out --tracks");
+}
+
+// Calls `check`; an error of usage without a place gets one, where that is known, and words before it.
+void with_place(const SweepOptions& options, PlanPlace place, const std::string& before,
+                const std::function<void()>& check) {
+    try {
+        check();
+    } catch (const SceneErrors&) {
+        throw;
+    } catch (const Error& error) {
+        if (error.code() != ErrorCode::usage) throw;
+        fail_at(options, place, before + error.what());
+    }
+}
+
 }  // namespace
 
 double largest_activation(const Scene& scene) {
@@ -67,18 +91,22 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     }
     check_options(options_);
     if (!options_.source) options_.source.emplace(options_.scene_file);
-    scene_ = options_.source->read(options_.overrides, SceneUse::without_frames);
-    stamps_ = stamps_of(scene_, {FileKind::first_state, FileKind::simulation});
-    try {
-        const std::size_t measured = check_measured(scene_);
-        if (!scene_.layers.empty()) options_.layer = scene_.layers[measured].name;
-        lattice_ = automaton_options(scene_, measured);
-    } catch (const SceneErrors&) {
-        throw;
-    } catch (const Error& error) {
-        if (error.code() != ErrorCode::usage) throw;
-        throw Error(ErrorCode::usage, fmt::format("{}: {}", options_.scene_file.string(), error.what()));
-    }
+    read_placed(options_, [&] {
+        scene_ = options_.source->read(options_.overrides, SceneUse::without_frames);
+        stamps_ = stamps_of(scene_, {FileKind::first_state, FileKind::simulation});
+    });
+    // What stands in the plan is of its scene.
+    const auto of_scene = [&](PlanPlace place) {
+        return place.line > 0 ? "" : options_.scene_file.string() + ": ";
+    };
+    std::size_t measured = 0;
+    with_place(options_, options_.layer_place, of_scene(options_.layer_place),
+               [&] { measured = measured_lattice(scene_, options_.layer); });
+    if (options_.tracks)
+        with_place(options_, options_.tracks_place, of_scene(options_.tracks_place),
+                   [&] { require_same_wind(scene_, measured); });
+    if (!scene_.layers.empty()) options_.layer = scene_.layers[measured].name;
+    lattice_ = automaton_options(scene_, measured);
     points_ = point_count(options_);
     if (is_sampled(options_.design))
         unit_points_ = unit_points(options_.design, points_, options_.axes.size(), options_.seed);
@@ -88,27 +116,13 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     simulation_hash_ = simulation_start(scene_).simulation_hash;
 }
 
-std::size_t SweepPlan::check_measured(const Scene& scene) const {
-    const std::size_t measured = measured_lattice(scene, options_.layer);
-    if (options_.tracks && !is_profile(automaton_options(with_files(scene), measured).wind.fields))
-        throw Error(ErrorCode::usage,
-                    "the scene has a wind that differs within a level, and clouds are followed only in one "
-                    "that is the "
-                    "same all over each level: leave out --tracks");
-    return measured;
-}
-
 void SweepPlan::check_measured(const Axis& axis, std::size_t n, const std::string& value,
                                const Scene& scene) const {
-    try {
-        check_measured(scene);
-    } catch (const SceneErrors&) {
-        throw;
-    } catch (const Error& error) {
-        if (error.code() != ErrorCode::usage) throw;
-        throw Error(ErrorCode::usage, fmt::format("axis {}: value {} is {}: {}", joined_keys(axis), n + 1,
-                                                  value, error.what()));
-    }
+    with_place(options_, place_of_value(axis, n),
+               fmt::format("axis {}: value {} is {}: ", joined_keys(axis), n + 1, value), [&] {
+                   const std::size_t measured = measured_lattice(scene, options_.layer);
+                   if (options_.tracks) require_same_wind(scene, measured);
+               });
 }
 
 bool SweepPlan::varies_lattice() const {
@@ -145,18 +159,24 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
         for (std::size_t n = 0; n < values.size(); ++n) {
             std::vector<std::string> overrides = options_.overrides;
             for (const std::string& key : axis.keys) overrides.push_back(key + "=" + values[n]);
-            const Scene scene = options_.source->read(overrides, SceneUse::without_frames);
-            check_measured(axis, n, values[n], scene);
-            if (std::optional<AxisFiles> files = axis_files(axis, values[n], scene)) {
+            const auto fail_as_before = [&](const char* what, std::size_t first) {
+                fail_at(options_, place_of_value(axis, n),
+                        fmt::format("axis {}: value {} is {}, {} value {}, {}: expected each value once",
+                                    joined_keys(axis), n + 1, values[n], what, first + 1, values[first]));
+            };
+            Scene scene;
+            std::optional<AxisFiles> files;
+            read_placed(options_, [&] {
+                scene = options_.source->read(overrides, SceneUse::without_frames);
+                check_measured(axis, n, values[n], scene);
+                with_place(options_, place_of_value(axis, n), "",
+                           [&] { files = axis_files(axis, values[n], scene); });
+            });
+            if (files) {
                 values[n] = firsts[n] = axis.values.at(n) = axis_value(*files, files->paths);
                 const std::size_t first = contents.emplace(files->digest, n).first->second;
                 if (first != n && options_.design == Design::grid)
-                    throw Error(
-                        ErrorCode::usage,
-                        fmt::format(
-                            "axis {}: value {} is {}, and has the content of value {}, {}: expected each "
-                            "value once",
-                            joined_keys(axis), n + 1, values[n], first + 1, values[first]));
+                    fail_as_before("and has the content of", first);
                 files_[a].emplace(values[n], std::move(*files));
                 continue;
             }
@@ -165,17 +185,14 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
             const std::size_t first = scenes.emplace(std::pair(hash.high, hash.low), n).first->second;
             if (first == n || (!is_compound(values[n]) && !is_compound(values[first]))) continue;
             firsts[n] = values[first];
-            if (options_.design == Design::grid)
-                throw Error(
-                    ErrorCode::usage,
-                    fmt::format("axis {}: value {} is {}, which is the same as value {}, {}: expected each "
-                                "value once",
-                                joined_keys(axis), n + 1, values[n], first + 1, values[first]));
+            if (options_.design == Design::grid) fail_as_before("which is the same as", first);
         }
     }
     // Values that are good alone may contradict each other.
-    if (points_ > 0) check_measured(scene_of(run(0)));
-    if (points_ > 1) check_measured(scene_of(run(runs() - 1)));
+    read_placed(options_, [&] {
+        if (points_ > 0) measured_lattice(scene_of(run(0)), options_.layer);
+        if (points_ > 1) measured_lattice(scene_of(run(runs() - 1)), options_.layer);
+    });
     return equals;
 }
 
@@ -204,11 +221,11 @@ void SweepPlan::require_different_points(const std::vector<std::vector<std::stri
     const std::uint64_t point = std::get<2>(*twice);
     std::string values = identity(values_of_point(point));
     std::ranges::replace(values, '\n', ' ');
-    throw Error(ErrorCode::usage,
-                fmt::format("points {} and {} of the {} are the same: {}: expected each point once{}", point + 1,
-                            std::get<2>(*std::next(twice)) + 1, design_name(options_.design),
-                            values.substr(0, values.size() - 1),
-                            is_sampled(options_.design) ? ", as of the values of a grid, or fewer points" : ""));
+    fail_at(options_, place_of_value(options_.axes.front(), std::get<2>(*std::next(twice))),
+            fmt::format("points {} and {} of the {} are the same: {}: expected each point once{}", point + 1,
+                        std::get<2>(*std::next(twice)) + 1, design_name(options_.design),
+                        values.substr(0, values.size() - 1),
+                        is_sampled(options_.design) ? ", as of the values of a grid, or fewer points" : ""));
 }
 
 std::vector<std::string> SweepPlan::values_of_point(std::uint64_t point) const {

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -34,6 +35,23 @@ inline constexpr std::string_view kWrittenBySweep = "# Written by nephos sweep.\
 
 enum class Scale { linear, log, integer };
 
+// A place in the file of a plan, line and column from 1; 0 of what stands in no file.
+struct PlanPlace {
+    int line = 0, column = 0;
+};
+
+// Where the parts of an axis stand: no part of what it says, so that all are equal.
+struct AxisPlaces {
+    std::vector<PlanPlace> keys, values;
+    PlanPlace range, from, to;
+    bool operator==(const AxisPlaces&) const { return true; }
+};
+
+// The file of a plan, that messages quote.
+struct PlanFile {
+    std::string label, text;
+};
+
 // Keys of the scene that take a value together.
 struct Axis {
     std::vector<std::string> keys;    // "field.background.ext"; at least one
@@ -42,6 +60,7 @@ struct Axis {
     // Of the other designs.
     double from = 0, to = 1;
     Scale scale = Scale::linear;
+    AxisPlaces places = {};
     bool operator==(const Axis&) const = default;
 };
 
@@ -74,6 +93,9 @@ struct SweepOptions {
     int clouds_every = 10;  // steps between the snapshots whose clouds are labelled; 0: none
     bool tracks = false;    // clouds are followed from step to step (statistics/tracks.h)
     std::string layer;      // whose statistics are taken; empty: the only lattice of the scene
+    std::shared_ptr<const PlanFile> file = {};    // that the places are of; null: none
+    std::vector<PlanPlace> override_places = {};  // of the first overrides, those of the file
+    PlanPlace layer_place = {}, tracks_place = {};
 };
 
 // One run, as its worker needs it.
@@ -120,9 +142,8 @@ class SweepPlan {
   private:
     // Returns for each value of each axis the first one of the axis that is the same.
     std::vector<std::vector<std::string>> check_axes();
-    // Returns measured_lattice() of a scene. Throws Error(usage) as that, and where clouds cannot be followed in its wind.
-    std::size_t check_measured(const Scene& scene) const;
-    // The same with the n-th value of an axis, which stands in the message.
+    // Checks a scene with the n-th value of an axis: it has the lattice that is measured, and clouds can be followed in its
+    // wind. Throws Error(usage) and SceneErrors with the place of the value.
     void check_measured(const Axis& axis, std::size_t n, const std::string& value, const Scene& scene) const;
     // `equals`: as check_axes() returns it.
     void require_different_points(const std::vector<std::vector<std::string>>& equals) const;

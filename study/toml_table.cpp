@@ -214,6 +214,20 @@ std::vector<std::string> TomlTable::values(const std::string& key) {
     return all;
 }
 
+Place TomlTable::place(std::string_view key) {
+    const Entry* entry = find(key);
+    return entry ? entry->value.place : node_.place;
+}
+
+std::vector<Place> TomlTable::item_places(std::string_view key) {
+    std::vector<Place> places;
+    const Entry* entry = find(key);
+    if (entry == nullptr) return places;
+    if (entry->value.kind != Node::Kind::array) return {entry->value.place};
+    for (const Node& item : entry->value.items) places.push_back(item.place);
+    return places;
+}
+
 void TomlTable::table(const std::string& key, const std::function<void(TomlTable&)>& read) {
     const Entry* entry = find(key);
     if (entry == nullptr) return;

@@ -32,6 +32,10 @@ class TomlTable {
     std::optional<std::size_t> word(const std::string& key, const std::vector<std::string_view>& words);
     std::vector<std::string> texts(const std::string& key);
     std::vector<std::string> values(const std::string& key);  // each as canonical_toml()
+    // Returns where the value of a key stands, or the table where the key is missing; and the items of an array, or the only
+    // value instead of one.
+    Place place(std::string_view key);
+    std::vector<Place> item_places(std::string_view key);
     // Calls `read` for the table `key`, or for each of an array of tables.
     void table(const std::string& key, const std::function<void(TomlTable&)>& read);
     void tables(const std::string& key, const std::function<void(TomlTable&)>& read);

@@ -97,7 +97,10 @@ SweepOptions options_of(const SweepArguments& a) {
     if (a.until) options.steps.until = a.until;
     if (a.clouds_every) options.clouds_every = int(*a.clouds_every);
     if (a.tracks) options.tracks = true;
-    if (!a.layer.empty()) options.layer = a.layer;
+    if (!a.layer.empty()) {
+        options.layer = a.layer;
+        options.layer_place = {};
+    }
     return options;
 }
 

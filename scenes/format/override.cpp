@@ -98,6 +98,8 @@ std::string key_problem(std::string_view key) {
     return "its character " + std::to_string(column) + " is " + enclosed(character, '`');
 }
 
+std::string option_label(std::string_view option) { return "--set " + shortened(option, 100); }
+
 std::vector<std::string> names_of_key(std::string_view key) {
     return names_on(parse_path(std::string(key) + "="));
 }
@@ -128,7 +130,7 @@ std::optional<Node> Document::option_value(int index, std::size_t equals, const 
 }
 
 void Document::set(const std::string& option, KeyForm (*describe)(const std::vector<std::string>& path)) {
-    const int index = add_origin("--set " + shortened(option, 100), option, false);
+    const int index = add_origin(option_label(option), option, false);
     const ParsedPath path = parse_path(origin(index).text);
     if (path.error_column > 0) {
         report({index, 1, path.error_column}, path.error, "expected --set key.path=value");

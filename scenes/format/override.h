@@ -13,6 +13,9 @@ namespace nephos {
 // key, is another question.
 std::string key_problem(std::string_view key);
 
+// Returns how messages name an option, as their file: "--set density.half=maybe", shortened.
+std::string option_label(std::string_view option);
+
 // Returns the names on the path, without indices; of what is no path those that begin it.
 std::vector<std::string> names_of_key(std::string_view key);
 

@@ -42,8 +42,9 @@ def _error(text, code, file=None, line=None, column=None):
     return error
 
 
-def _call(arguments, allowed=(0,), plan=None):
-    """Runs the command. `plan` is a file that its user did not write: messages call it the arguments."""
+def _call(arguments, allowed=(0,), plan=None, axes=()):
+    """Runs the command. `plan` is a file that its user did not write: messages call it the arguments, and name the axis that
+    `axes` has for a line of it."""
     try:
         process = subprocess.Popen([_command(), *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                    text=True, errors="backslashreplace")
@@ -61,8 +62,10 @@ def _call(arguments, allowed=(0,), plan=None):
     if process.returncode not in allowed:
         code = {1: "check", 2: "usage", 3: "io", 4: "gpu"}.get(process.returncode, "io")
         if plan is not None:
-            message = message.replace(f"{plan}:", "arguments:")
-            message = re.sub(r"^--set (.*: error: )", r"axis \1", message, flags=re.MULTILINE)
+            message = re.sub(rf"^{re.escape(str(plan))}:(\d+):\d+: (?=error: )",
+                             lambda place: f"arguments: axis {axes[int(place[1])]}: " if int(place[1]) in axes else place[0],
+                             message, flags=re.MULTILINE).replace(f"{plan}:", "arguments:")
+            message = message.replace(f"{plan.with_name('scene.toml')}:", "scene:")
         place = re.match(r"(?:error: )?(?!arguments:)(.+?):(?:(\d+):(\d+):)? ", message)
         found = place and (os.path.isabs(place[1]) or place[1] in map(str, arguments) or os.path.exists(place[1]))
         where = (place[1], *(int(number) if number else None for number in place.groups()[1:])) if found else ()
@@ -181,6 +184,8 @@ def _pair(name, values, expected):
 
 
 def _plan(axes, options):
+    """Returns the lines of a plan, and the keys of the axis that stands in a line of it, by its number from 1."""
+    places = {}
     lines = [f"{key} = {_toml_text(value)}" for key, value in options.items() if value is not None]
     for key, values in axes.items():
         keys = [key] if isinstance(key, str) else list(key)
@@ -197,7 +202,8 @@ def _plan(axes, options):
         else:
             text = _toml_text(values)
         lines += ["", "[[axis]]", f"keys = {_toml_text(keys)}", f"{name} = {text}"]
-    return "\n".join(lines) + "\n"
+        places.update(dict.fromkeys((len(lines) - 1, len(lines)), "+".join(map(str, keys))))
+    return "\n".join(lines) + "\n", places
 
 
 def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", points=None, seed=1, seeds="per_point",
@@ -238,10 +244,12 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
         else:
             options["scene"] = os.path.abspath(scene)
         plan = pathlib.Path(folder, "sweep.toml")
-        plan.write_text(_plan(axes, options), encoding="utf-8")
+        text, places = _plan(axes, options)
+        plan.write_text(text, encoding="utf-8")
         jobs = [] if workers is None else ["--workers", workers]
         part = [] if shard is None else ["--shard", "{}/{}".format(*_pair("shard", shard, "(i, n)"))]
-        _call(["sweep", plan, "--out", out, "--quiet", *jobs, *part, *_flags(retry_failed, overwrite)], allowed=(0, 1), plan=plan)
+        _call(["sweep", plan, "--out", out, "--quiet", *jobs, *part, *_flags(retry_failed, overwrite)], allowed=(0, 1), plan=plan,
+              axes=places)
     return Sweep(out) if shard is None else None
 
 

@@ -146,6 +146,41 @@ sd = 0.1
         self.refused(2, "fit", fit, "--out", "no", "-j", "1", says="a run takes about", **limit)
         self.assertFalse((self.folder / "no").exists())
 
+    def test_what_is_wrong_is_said_where_it_stands(self):
+        """In the file of the plan, with line and column; of several overrides and values at the one that it is of."""
+        ext = '[[axis]]\nkey = "field.background.ext"\n'
+        for text, says in (
+                (ext + "values = [0.1, 1.5]\n", "6:16: error: `field.background.ext` is 1.5"),
+                (ext + "values = [0.1, 0.2, 0.10]\n", "6:21: error: axis field.background.ext: value 3 is 0.1, and so is value 1"),
+                ('[[axis]]\nkey = "field.background.exd"\nvalues = [0.1]\n', "5:7: error: unknown key"),
+                ('[[axis]]\nkeys = ["field.background.act",\n  "seed"]\nvalues = [0.1]\n', "6:3: error: axis field.background.act+seed: the seed is"),
+                (ext + ext + "values = [0.1]\n", "error: "),
+                (ext + "values = [0.1]\n" + ext + "values = [0.2]\n", "8:7: error: key `field.background.ext` is in two axes"),
+                ('set = ["name=x", "field.background.hum=7"]\n', "4:18: error: `field.background.hum` is 7"),
+                ('set = ["name=x", "field.backgrount.hum=7"]\n', "4:18: error: unknown key"),
+                ('design = "sobol"\npoints = 2\n' + ext + "range = { from = -1.0, to = 0.3 }\n", "8:18: error: `field.background.ext` is -1"),
+                (ext + "range = { from = 0.1, to = 1.5, count = 3 }\n", "6:28: error: `field.background.ext` is 1.5"),
+                (ext + "range = { from = 0.1, to = 0.5 }\n", "6:9: error: axis field.background.ext: has a range without a number"),
+                ('layer = "low"\n', "4:9: error: the scene has no layers, and so none named `low`"),
+                ('[[axis]]\nkey = "layer"\nvalues = [[], [{ name = "v", veil = { form = "cirrus" } }]]\n', "6:15: error: ")):
+            with self.subTest(text=text):
+                self.plan(text)
+                said = self.call("sweep", "plan.toml", "--out", "no", status=2).stderr
+                self.assertTrue(said.startswith("plan.toml:"), said)
+                self.assertIn(f"plan.toml:{says}" if says[0].isdigit() else says, said)
+                self.assertNotIn("--set", said)
+        plan = self.write("state.toml", 'scene = "tiny.toml"\n[[axis]]\nkey = "lattice.initial_state"\nvalues = ["none.vdb"]\n')
+        said = self.call("sweep", plan, "--out", "no", status=3).stderr
+        self.assertIn("state.toml:4:11: error: ", said)
+        # What was given beside it has no place there.
+        self.plan(ext + "values = [0.1]\n")
+        for arguments, says in ((("--axis", "field.background.act=2"), "--set field.background.act=2: error: "),
+                                (("--set", "field.background.act=2"), "--set field.background.act=2: error: "),
+                                (("--layer", "low"), "error: null.toml: the scene has no layers")):
+            said = self.call("sweep", "plan.toml", *arguments, "--out", "no", status=2).stderr
+            self.assertTrue(said.startswith(says), said)
+        self.assertFalse((self.folder / "no").exists())
+
 
 if __name__ == "__main__":
     unittest.main()

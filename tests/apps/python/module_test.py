@@ -414,13 +414,19 @@ sd = 0.01
         with self.assertRaisesRegex(nephos.Error, "a probability per step") as caught:
             nephos.sweep(scene, {"field.background.ext": [0.1, 1.5]}, out=self.folder / "bad")
         self.assertEqual(caught.exception.code, "usage")
-        self.assertIn("axis field.background.ext=1.5: error: `field.background.ext` is 1.5", str(caught.exception))
+        self.assertIn("arguments: axis field.background.ext: error: `field.background.ext` is 1.5", str(caught.exception))
+        self.assertIsNone(caught.exception.file)
         with self.assertRaisesRegex(nephos.Error, "did you mean"):
             nephos.sweep(scene, {"field.background.exd": [0.1]}, out=self.folder / "bad")
         # No word of the plan, which the user never wrote.
         for axes, options, says in (({"field.background.ext": []}, {}, r"axes\['field.background.ext'\] has no values"),
                                     ({"field.background.ext": [0.1]}, {"replicates": 0}, "arguments:.*`replicates` is 0"),
-                                    ({"field.background.ext": {"from": 0.2, "to": 0.1}}, {}, "arguments:.*range of an axis is empty")):
+                                    ({"field.background.ext": {"from": 0.2, "to": 0.1}}, {}, "arguments:.*range of an axis is empty"),
+                                    ({"field.background.ext": {"count": 3}}, {}, "axis field.background.ext: error: the range has no `from`"),
+                                    ({"field.background.act": [0.1], "seed=7 #": [1]}, {}, "axis seed=7 #: error: `seed=7 #` is no key of a scene"),
+                                    ({"field.background.ext": [0.1, 0.1]}, {}, "axis field.background.ext: error: axis .*: value 2 is 0.1, and so"),
+                                    ({"field.background.ext": [0.1]}, {"layer": "low"}, "arguments:.*error: the scene has no layers"),
+                                    ({"layer": [[{"name": "v", "veil": {"form": "cirrus"}}]]}, {}, "has no layer with an automaton")):
             with self.assertRaisesRegex(nephos.Error, says) as caught:
                 nephos.sweep(scene, axes, out=self.folder / "bad", **options)
             self.assertNotIn(tempfile.gettempdir() + "/nephos-", str(caught.exception))
