@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/axis_text.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <optional>
@@ -10,11 +11,14 @@
 
 #include "core/text.h"
 #include "scenes/format/override.h"
+#include "scenes/format/schema.h"
 #include "scenes/format/text.h"
 
 namespace nephos {
 
-std::string canonical_value(const std::string& value) {
+namespace {
+
+std::string canonical_number_or_word(const std::string& value) {
     if (value.empty() || value == "true" || value == "false") return value;
     if (std::string_view("\"'[{").find(value[0]) != std::string_view::npos)
         return canonical_toml(value).value_or(value);
@@ -32,8 +36,23 @@ std::string canonical_value(const std::string& value) {
     // 0x10 and 1_000 are numbers of TOML, too.
     const bool may_be = value.find_first_not_of("0123456789abcdefABCDEFxob_.+-") == value.npos;
     const std::optional<std::string> other = may_be ? canonical_toml(value) : std::nullopt;
-    if (other && *other != value) return canonical_value(*other);
+    if (other && *other != value) return canonical_number_or_word(*other);
     return toml_string(value);
+}
+
+}  // namespace
+
+std::string canonical_value(const std::string& value, bool of_text) {
+    std::string text = canonical_number_or_word(value);
+    const bool is_number = text != value && !is_compound(text) && !text.starts_with('"');
+    return of_text && is_number ? toml_string(value) : text;
+}
+
+bool take_text(const std::vector<std::string>& keys) {
+    return !keys.empty() && std::ranges::all_of(keys, [](const std::string& name) {
+        const Key* key = find_key(names_of_key(name));
+        return key != nullptr && takes_text(*key);
+    });
 }
 
 std::string no_key_text(std::string_view key) {

@@ -44,7 +44,9 @@ std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem:
     base.overrides = table.texts("set");
     base.layer = table.text("layer").value_or("");
     if (!table.has("scene")) table.report("scene", "the fit has no scene", "expected scene = \"FILE.toml\"");
-    if (!scene) return std::nullopt;
+    if (scene && scene->empty())
+        table.report("scene", "`scene` names no file", "expected scene = \"FILE.toml\"");
+    if (!scene || scene->empty()) return std::nullopt;
     base.scene_file = folder / *scene;
     try {
         base.source.emplace(base.scene_file);

@@ -10,7 +10,8 @@
 
 namespace nephos {
 
-// Throws Error(usage), or SceneErrors with a place, where the options contradict each other, or axes overlap. Keys and values are canonical (axis_text.h).
+// Throws Error(usage), or SceneErrors with a place, where the options contradict each other, or axes overlap.
+// Keys and values are canonical (axis_text.h).
 void check_options(const SweepOptions& options);
 
 // Returns the number of points, at least one too many where that is above the limit.

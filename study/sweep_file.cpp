@@ -117,13 +117,14 @@ double parse_number(std::string_view text, const std::string& whole) {
     throw Error(ErrorCode::usage, fmt::format("'{}': '{}' is not a number", whole, text));
 }
 
-// Cuts at separators that are not inside quotes or brackets.
-std::vector<std::string> pieces(std::string_view text, char separator) {
-    std::vector<std::string> parts{""};
+// Returns the text with zeros in place of what is inside quotes or brackets, and of these.
+std::string outside(std::string_view text) {
+    std::string outer;
     int depth = 0;
     char quote = 0;
     bool escaped = false;
     for (const char c : text) {
+        bool is_inside = depth > 0 || quote != 0;
         if (quote != 0) {
             if (c == quote && !escaped) quote = 0;
             escaped = quote == '"' && c == '\\' && !escaped;
@@ -134,11 +135,20 @@ std::vector<std::string> pieces(std::string_view text, char separator) {
         } else if (c == ']' || c == '}') {
             --depth;
         }
-        if (c == separator && depth == 0 && quote == 0) {
-            parts.emplace_back();
-        } else {
-            parts.back() += c;
-        }
+        is_inside = is_inside || depth > 0 || quote != 0;
+        outer += is_inside ? '\0' : c;
+    }
+    return outer;
+}
+
+// Cuts at separators that are not inside quotes or brackets.
+std::vector<std::string> pieces(std::string_view text, char separator) {
+    std::vector<std::string> parts;
+    const std::string outer = outside(text);
+    std::size_t begin = 0;
+    for (std::size_t end = 0; end != outer.npos; begin = end + 1) {
+        end = outer.find(separator, begin);
+        parts.emplace_back(text.substr(begin, end == outer.npos ? end : end - begin));
     }
     return parts;
 }
@@ -157,6 +167,8 @@ SweepOptions read_sweep_text(std::string text, const std::filesystem::path& path
         const std::optional<std::string> scene = table.text("scene");
         if (!scene && !table.has("scene"))
             table.report("scene", "the sweep has no scene", "expected scene = \"FILE.toml\"");
+        if (scene && scene->empty())
+            table.report("scene", "`scene` names no file", "expected scene = \"FILE.toml\"");
         options.scene_file = path.parent_path() / scene.value_or("");
         options.overrides = table.texts("set");
         options.override_places = places_in(table, "set");
@@ -226,7 +238,7 @@ Axis parse_axis(const std::string& text) {
         axis.scale = Scale(n);
         rest.remove_prefix(prefix.size());
     }
-    const std::size_t dots = rest.find("..");
+    const std::size_t dots = outside(rest).find("..");
     const bool is_file = rest.find('/') != rest.npos;  // "../a.vdb"
     const bool is_range =
         dots != rest.npos && !is_file && std::string_view("\"'[{").find(rest[0]) == std::string_view::npos;

@@ -87,7 +87,8 @@ double largest_activation(const Scene& scene) {
 SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     for (Axis& axis : options_.axes) {
         for (std::string& key : axis.keys) key = canonical_key(key);
-        for (std::string& value : axis.values) value = canonical_value(value);
+        const bool of_text = take_text(axis.keys);
+        for (std::string& value : axis.values) value = canonical_value(value, of_text);
     }
     check_options(options_);
     if (!options_.source) options_.source.emplace(options_.scene_file);
@@ -196,8 +197,8 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
     return equals;
 }
 
-// Points of a list, and those of a sample of whole numbers alone, may have all values in common: their runs would have the same
-// ids. Throws Error(usage) that names the first two.
+// Points of a list, and those of a sample of whole numbers alone, may have all values in common: their runs would have the
+// same ids. Throws Error(usage) that names the first two.
 void SweepPlan::require_different_points(const std::vector<std::vector<std::string>>& equals) const {
     const bool may_repeat = options_.design == Design::list ||
                             (is_sampled(options_.design) && std::ranges::all_of(options_.axes, [](const Axis& axis) {

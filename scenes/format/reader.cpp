@@ -153,10 +153,7 @@ class SceneReader {
 KeyForm describe(const std::vector<std::string>& path) {
     const Key* key = find_key(path);
     if (key == nullptr) return {};
-    const bool takes_text = key->kind == KeyKind::text || key->kind == KeyKind::path ||
-                            key->kind == KeyKind::word || key->kind == KeyKind::texts ||
-                            key->kind == KeyKind::boundaries;
-    return {takes_text, expected_text(*key)};
+    return {takes_text(*key), expected_text(*key)};
 }
 
 bool sets_model_files(std::string_view option) {

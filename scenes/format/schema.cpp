@@ -83,6 +83,11 @@ const Key* Section::find(std::string_view name) const {
     return nullptr;
 }
 
+bool takes_text(const Key& key) {
+    return key.kind == KeyKind::text || key.kind == KeyKind::path || key.kind == KeyKind::word ||
+           key.kind == KeyKind::texts || key.kind == KeyKind::boundaries;
+}
+
 const Key* find_key(const std::vector<std::string>& path) {
     const Section* section = &scene_section();
     const Key* key = nullptr;

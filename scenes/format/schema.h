@@ -132,6 +132,9 @@ const Section& scene_section();
 // Returns the key at a path of names without indices ("field", "scatters", "count"); null when there is none.
 const Key* find_key(const std::vector<std::string>& path);
 
+// Returns whether an option may give a value of the key without quotes as a text.
+bool takes_text(const Key& key);
+
 // Returns the path of a key of a section: key_path("sun", "date") is "sun.date". Either may be empty.
 std::string key_path(std::string_view section, std::string_view key);
 

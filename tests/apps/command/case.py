@@ -116,10 +116,11 @@ class Case(unittest.TestCase):
         return result
 
     def refused(self, status, *arguments, says, **options):
-        """A call that fails as it should: nothing on stdout, one message on stderr that contains `says`."""
+        """A call that fails as it should: nothing on stdout, one message on stderr, with or without a place in a file, that
+        contains `says`."""
         result = self.call(*arguments, status=status, **options)
         self.assertEqual(result.stdout, "")
-        self.assertTrue(result.stderr.startswith("error: "), result.stderr)
+        self.assertRegex(result.stderr, r"\A(?:[^\n]+:\d+:\d+: )?error: ")
         self.assertIn(says, result.stderr)
         return result
 

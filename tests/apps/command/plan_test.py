@@ -5,7 +5,7 @@ is said where it stands."""
 import unittest
 
 from case import Case, LAYERED, SANITIZED, limit_addresses
-from sweep_test import NULL
+from sweep_test import NULL, rows
 
 # Two layers with lattices of their own, at different heights and of cells of different sizes.
 LAYERS = """\
@@ -180,6 +180,26 @@ sd = 0.1
             said = self.call("sweep", "plan.toml", *arguments, "--out", "no", status=2).stderr
             self.assertTrue(said.startswith(says), said)
         self.assertFalse((self.folder / "no").exists())
+
+    def test_names_of_files_are_texts(self):
+        for name in ("007", "7", "a..b.vdb"):
+            for hum in ("0.1", "0.2"):
+                self.call("state", self.scene, "--steps", "1", "--set", f"field.background.hum={hum}", "--out", f"{name}.vdb")
+            (self.folder / f"{name}.vdb").rename(self.folder / name)
+        self.call("state", self.scene, "--steps", "1", "--out", "c.vdb")
+        for axis, names in (("007", ["007"]), ("c.vdb,007", ["c.vdb", "007"]), ('c.vdb,"a..b.vdb"', ["c.vdb", "a..b.vdb"]), ("7", ["7"])):
+            with self.subTest(axis=axis):
+                self.call("sweep", self.scene, "--axis", f"lattice.initial_state={axis}", "--replicates", "1", "--steps", "20", "--out", "files")
+                self.assertEqual([run["lattice.initial_state"] for run in rows(self.folder / "files/runs.csv")],
+                                 [str(self.folder / name) for name in names])
+        # A number stays one, however it is written.
+        said = self.call("sweep", self.null, "--axis", "lattice.cells[0]=0x10,1_6", "--out", "no", status=2).stderr
+        self.assertIn("value 2 is 16, and so is value 1", said)
+
+    def test_a_scene_without_a_name_is_said_where_it_stands(self):
+        self.write("plan.toml", 'scene = ""\n')
+        self.assertIn("plan.toml:1:9: error: `scene` names no file", self.call("sweep", "plan.toml", status=2).stderr)
+        self.assertIn("plan.toml:1:9: error: `scene` names no file", self.call("fit", "plan.toml", status=2).stderr)
 
 
 if __name__ == "__main__":
