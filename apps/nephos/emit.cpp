@@ -28,7 +28,8 @@ exec "${{NEPHOS:-nephos}}" sweep sweep.toml --shard "$SLURM_ARRAY_TASK_ID/{0}" \
     --workers "${{SLURM_CPUS_PER_TASK:-1}}" --out . --quiet
 )";
 
-// The records of a part are no output of its rule: Snakemake removes outputs before it runs a rule again, and they go on.
+// The records of a part are no output of its rule: Snakemake removes outputs before it runs a rule again, and they go on. What
+// is done is of a number of parts: with another one, part 0 has other runs.
 constexpr std::string_view kSnakemake =
     R"(# Runs a sweep in {0} parts and makes its tables: snakemake --cores N, in this folder.
 # NEPHOS names the program where it is not in the path.
@@ -37,13 +38,13 @@ import os
 NEPHOS = os.environ.get("NEPHOS", "nephos")
 
 rule tables:
-    input: expand("shards/{{shard}}.done", shard=range({0}))
+    input: expand("shards/{{shard}}-of-{0}.done", shard=range({0}))
     output: "points.csv", "runs.csv", "series.nc", "failures.csv", "manifest.json"
     shell: "{{NEPHOS:q}} merge . --quiet"
 
 rule shard:
     input: "sweep.toml", "scene.toml"
-    output: touch("shards/{{shard}}.done")
+    output: touch("shards/{{shard}}-of-{0}.done")
     threads: 1
     shell: "{{NEPHOS:q}} sweep sweep.toml --shard {{wildcards.shard}}/{0} --workers {{threads}} --out . --quiet"
 )";

@@ -55,6 +55,16 @@ class Engines(Emitted):
                                capture_output=True, text=True)
         self.assertIn("Nothing to be done", again.stdout + again.stderr)
 
+    def test_snakemake_with_another_number_of_parts(self):
+        """What is done of one number of parts says nothing of another one, also where times of files alone decide."""
+        self.sweep("emitted", "--emit", "snakemake", "--tasks", "3")
+        self.command("snakemake", "--cores", "1", "shards/0-of-3.done")
+        self.sweep("emitted", "--emit", "snakemake", "--tasks", "2")
+        self.command("snakemake", "--cores", "2", "--rerun-triggers", "mtime")
+        self.assertEqual({path.name for path in (self.folder / "emitted/shards").glob("*.done")},
+                         {"0-of-3.done", "0-of-2.done", "1-of-2.done"})
+        self.same_tables()
+
     def test_snakemake_goes_on_after_a_part_failed(self):
         self.sweep("emitted", "--emit", "snakemake", "--tasks", "3")
         # One part's machine fails.
