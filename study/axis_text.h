@@ -22,8 +22,8 @@ inline constexpr std::string_view kExpectedKey =
     "expected such as field.background.ext or wind[0].levels[1].height_m";
 
 // Returns one text for one value: "0.10" is 0.1, a word without quotes gets them, "[1,2]" is "[1, 2]". What is no value
-// stays as it is, and whoever reads the scene with it says why. `of_text`: of keys that take text, as the name of a file: "007" is
-// a text then, and not 7.
+// stays as it is, and whoever reads the scene with it says why. `of_text`: of keys that take text, as the name of a file:
+// "007" is a text then, and not 7.
 std::string canonical_value(const std::string& value, bool of_text = false);
 
 // Returns whether all keys of an axis take text.

@@ -87,6 +87,8 @@ struct FitResult {
     // Number of independent points that the weighted ones of the posterior are worth, (sum w)^2 / sum w^2; below 200 the
     // quantiles are rough.
     double effective_samples = 0;
+    std::vector<std::string>
+        problems;  // of records in the folder of the fit that cannot be read (Records::problems())
 };
 
 // Returns how many runs a fit of so many parameters takes at least: half of them must give each emulator its first degree.

@@ -163,6 +163,7 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
     require_memory_for(plan_of_ends,
                        int(std::min<std::uint64_t>(std::uint64_t(job.workers), options.problem.runs)));
     const std::string& simulation_hash = plan_of_ends.simulation_hash();
+    std::vector<std::string> problems;
     const Simulate simulate = [&](int wave, const std::vector<std::vector<double>>& points) {
         const SweepPlan plan = plan_of(options, points);
         if (plan.simulation_hash() != simulation_hash)
@@ -175,12 +176,14 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
         const SweepReport report = run_sweep(
             plan, part, [&](const SweepProgress& p) { progress(wave, p); }, stop);
         if (!report.complete) throw Stopped{};
+        problems.insert(problems.end(), report.problems.begin(), report.problems.end());
         const Records records = Records::read({part.folder});
         write_tables(plan, records, part.folder);
         return runs_of(options, plan, records, points);
     };
     try {
         FitResult result = fit(options.problem, simulate);
+        result.problems = std::move(problems);
         write_results(options, result, job.folder);
         return result;
     } catch (const Stopped&) {

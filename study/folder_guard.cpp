@@ -2,6 +2,7 @@
 #include "study/folder_guard.h"
 
 #include <cerrno>
+#include <ctime>
 
 #include "study/shard_files.h"
 #include <fcntl.h>
@@ -14,14 +15,21 @@
 
 namespace nephos {
 
-FolderGuard::FolderGuard(const std::filesystem::path& folder) : folder_(folder) {
+FolderGuard::FolderGuard(const std::filesystem::path& folder, const std::function<bool()>& stop)
+    : folder_(folder) {
     const std::filesystem::path shards = folder / "shards";
     create_folders(shards);
     // A file that is open for writing: NFS locks no folders, and no others exclusively.
     file_ = open_regular_file(shards / "lock", O_RDWR | O_CREAT | O_NOFOLLOW).release();
-    // Where a file system has no locks, nothing is kept apart, as with those of shards.
-    while (::flock(file_, LOCK_EX) != 0 && errno == EINTR) {
+    // Signals that are remembered for later do not end a wait for the lock: it is asked for again and again instead.
+    constexpr timespec kPause{0, 20'000'000};
+    while (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
+        // Where a file system has no locks, nothing is kept apart, as with those of shards.
+        if (errno != EWOULDBLOCK && errno != EINTR) break;
+        if (stop && stop()) return;
+        ::nanosleep(&kPause, nullptr);
     }
+    is_held_ = true;
 }
 
 FolderGuard::~FolderGuard() { ::close(file_); }

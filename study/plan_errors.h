@@ -13,12 +13,13 @@
 
 namespace nephos {
 
-// Throws SceneErrors with the place where there is one, else Error with the same text. What follows the last ": expected " is
-// what was expected.
+// Throws SceneErrors with the place where there is one, else Error with the same text. What follows the last ": expected "
+// is what was expected.
 [[noreturn]] void fail_at(const SweepOptions& options, PlanPlace place, const std::string& message,
                           ErrorCode code = ErrorCode::usage);
 
-// Returns where the n-th key of an axis stands, or its n-th value: of a range with a count the ends have places of their own.
+// Returns where the n-th key of an axis stands, or its n-th value: of a range with a count the ends have places of their
+// own.
 PlanPlace place_of_key(const Axis& axis, std::size_t n);
 PlanPlace place_of_value(const Axis& axis, std::size_t n);
 

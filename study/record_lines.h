@@ -18,7 +18,8 @@ bool is_whole_record(std::string_view line);
 // Returns whether a line ends as records do, whatever its hash is.
 bool ends_as_record(std::string_view line);
 
-// Returns the record of a whole line. Throws nlohmann::json::exception where it is not of a run, Error(io) on an unknown regime.
+// Returns the record of a whole line. Throws nlohmann::json::exception where it is not of a run, Error(io) on an unknown
+// regime.
 RunRecord record_of(const nlohmann::ordered_json& json);
 
 // Returns the XXH3-128 of a text, 32 hexadecimal digits.

@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <sstream>
+#include <string>
 #include <string_view>
 #include <system_error>
 
 #include "study/folder_contents.h"
+#include "study/record_lines.h"
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
@@ -29,12 +32,22 @@ bool is_name_of_shard(const std::filesystem::path& path) {
            is_number(std::string_view(name).substr(middle + 4));
 }
 
+// Returns whether a line of a file ends as records do: what is damaged in its beginning tells so what it was.
+bool has_end_of_record(const std::filesystem::path& path) {
+    constexpr std::size_t kMostBytes = std::size_t(1) << 20;
+    std::istringstream lines(read_beginning(path, kMostBytes));
+    for (std::string line; std::getline(lines, line);)
+        if (ends_as_record(line)) return true;
+    return false;
+}
+
 }  // namespace
 
 void require_own_records(const std::filesystem::path& path) {
     constexpr std::string_view kRecord = "{\"run\":\"";
     const std::string beginning = read_beginning(path, kRecord.size());
-    if (!kRecord.starts_with(beginning)) require_own(path, kRecord, "a sweep");
+    if (kRecord.starts_with(beginning) || has_end_of_record(path)) return;
+    require_own(path, kRecord, "a sweep");
 }
 
 std::vector<std::filesystem::path> files_of_shards(const std::filesystem::path& folder) {

@@ -21,7 +21,7 @@ std::filesystem::path shard_path(const std::filesystem::path& folder, std::uint3
 // Locks an open shard for writing. Throws Error(io) when another process has done so.
 void lock_shard(const std::filesystem::path& path, int descriptor);
 
-// Throws Error(usage) where the file is there and is no shard, nor the first part of one.
+// Throws Error(usage) where the file is there and is no shard, not a damaged one either, nor the first part of one.
 void require_own_records(const std::filesystem::path& path);
 
 // Removes the shards of a folder, or only the one of a number where `of` is above 1. Throws Error(io), also when another

@@ -2,11 +2,14 @@
 #include "study/sweep.h"
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <optional>
 #include <set>
 #include <span>
+#include <string_view>
 
 #include "study/folder_contents.h"
 #include "study/folder_guard.h"
@@ -29,10 +32,23 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kNamedFailures = 5;
 
-// Before the runs: what stands in its place is refused at once.
+// Before the runs: what stands in its place is refused at once. Takes away what a kill or a full disk left of a last line.
 Descriptor open_timing(const std::filesystem::path& path) {
     separate_from_links(path);
-    return open_regular_file(path, O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW);
+    Descriptor file = open_regular_file(path, O_RDWR | O_APPEND | O_CREAT | O_NOFOLLOW);
+    struct stat status {};
+    if (::fstat(file.get(), &status) != 0 || status.st_size == 0) return file;
+    std::array<char, 4096> tail{};  // more than a line
+    const off_t begin = std::max<off_t>(0, status.st_size - off_t(tail.size()));
+    const ssize_t got = ::pread(file.get(), tail.data(), tail.size(), begin);
+    if (got <= 0 || begin + got != status.st_size) return file;
+    const std::string_view end(tail.data(), std::size_t(got));
+    const std::size_t last = end.rfind('\n');
+    if (last == end.npos && begin > 0) return file;
+    const off_t whole = last == end.npos ? 0 : begin + off_t(last) + 1;
+    if (whole < status.st_size && ::ftruncate(file.get(), whole) != 0)
+        throw Error(ErrorCode::io, path.string() + ": cannot write: " + std::strerror(errno));
+    return file;
 }
 
 // Appends the time that a shard took. Returns the system's error, 0 without one.
@@ -191,7 +207,12 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<bool()>& stop) {
     const Clock::time_point begin = Clock::now();
     require_sweep_folder(job.folder);
-    std::optional<FolderGuard> guard(job.folder);
+    std::optional<FolderGuard> guard(std::in_place, job.folder, stop);
+    if (!guard->is_held()) {  // stopped while another process had the folder
+        SweepReport report = status_of(plan, job, Records::read({job.folder}));
+        report.complete = false;
+        return report;
+    }
     require_place_for(plan, *guard, job.folder);
     if (job.overwrite) remove_shards(job.folder, job.shard, job.shards);
     // Whoever overwrites does not ask what other shards have done: they may be of another version.

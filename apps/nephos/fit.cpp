@@ -55,7 +55,9 @@ int fit(const FitArguments& a) {
                                : "stopped; the same command goes on");
         return 128 + pending_signal();
     }
-    if (a.work.quiet) return 0;
+    print_problems(result->problems);
+    const int status = result->problems.empty() ? 0 : int(ErrorCode::io);
+    if (a.work.quiet) return status;
     Output output;
     output.write(fit_text(options, *result));
     const std::string folder = job.folder.string();
@@ -64,7 +66,7 @@ int fit(const FitArguments& a) {
                     "{0}/posterior.csv  1,000 equally likely parameters\n"
                     "{0}/fit.json       all of the above",
                     folder));
-    return 0;
+    return status;
 }
 
 }  // namespace

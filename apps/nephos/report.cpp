@@ -50,7 +50,7 @@ int report(const ReportArguments& a) {
                                                     : std::filesystem::path(a.out);
     if (!is_empty_file(out)) require_own(out, kReportBeginning, "`nephos report`");
     write_report(plan, records, out);
-    for (const std::string& problem : records.problems()) print_error(problem);
+    print_problems(records.problems());
     if (!a.work.quiet)
         Output().line(fmt::format("{}  one page, without network: open it in a browser", out.string()));
     return records.problems().empty() ? 0 : int(ErrorCode::io);

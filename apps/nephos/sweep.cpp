@@ -148,11 +148,6 @@ void print_unused(std::uint64_t records, const std::string& folders) {
                                folders, records));
 }
 
-// What is wrong with shards that could not be read as a whole.
-void print_problems(const std::vector<std::string>& problems) {
-    for (const std::string& problem : problems) print_error(problem);
-}
-
 // Points that have no mean, and those whose errors disagree, are said and not left to the table.
 void print_warnings_of_points(const SweepPlan& plan, const Records& records) {
     std::uint64_t unsteady = 0, differ = 0;
@@ -247,14 +242,16 @@ int sweep(const SweepArguments& a) {
     if (!a.work.quiet) print_unused(report.unused, folder);
     if (a.work.json) output.line(json_text(report_json(plan, report, folder)));
     const bool quiet = a.work.quiet || a.work.json;
-    if (pending_signal() != 0) {
+    const auto stopped = [&] {
         print_note(fmt::format("stopped after {} of {} runs; the same command{} goes on",
                                report.progress.done, report.progress.in_all,
                                a.overwrite ? " without --overwrite" : ""));
         return 128 + pending_signal();
-    }
+    };
+    if (pending_signal() != 0) return stopped();
     if (job.shards == 1) {
-        const FolderGuard guard(job.folder);
+        const FolderGuard guard(job.folder, [] { return pending_signal() != 0; });
+        if (!guard.is_held()) return stopped();
         if (!is_plan_of(plan, job.folder))
             throw Error(ErrorCode::io,
                         folder + ": another plan took the place of this one: no tables are written");

@@ -93,6 +93,9 @@ void print_sequences(std::string_view text) {
     std::fflush(stderr);
 }
 void print_error(std::string_view message) { print_labelled("error:", Style::red, message); }
+void print_problems(const std::vector<std::string>& problems) {
+    for (const std::string& problem : problems) print_error(problem);
+}
 void print_error(const Error& error) {
     const SourcePosition& where = error.where();
     std::string place;

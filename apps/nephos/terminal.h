@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -45,6 +46,8 @@ std::string styled(std::string_view text, Style style, bool colours);
 
 // Messages on standard error, one line each or more: "error: ...", "note: ..."; the label in colour.
 void print_error(std::string_view message);
+void print_problems(
+    const std::vector<std::string>& problems);  // each as an error, of what went on all the same
 void print_error(const Error& error);  // with its place, when it has one
 void print_note(std::string_view message);
 // Prints text on standard error; failures to write are ignored, there is nowhere left to say so.

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Records of `nephos sweep` that are damaged, or that other processes hold: each is named, and nothing is lost for it."""
 
+import fcntl
 import json
 import re
+import shutil
+import signal
+import subprocess
+import time
 import unittest
 
 import xxhash
 
-from case import Case
+from case import Case, NEPHOS
 from sweep_test import NULL, TABLES, rows
 
 
@@ -85,6 +90,84 @@ class Records(Case):
             self.assertIn(f"at byte {first['series_offset']}, of run {first['run']}: ", said)
             self.assertIn("`nephos sweep` with --overwrite computes it again", said)
             self.assertEqual((self.folder / "old/points.csv").read_text(), "point,as it was\n")
+
+    def test_damage_at_the_beginning_of_a_shard_is_damage(self):
+        """Its records end as those of a sweep do. A file of somebody else is refused as before."""
+        self.sweep("a")
+        before = self.tables("a")
+        records = self.folder / "a/shards/0000-of-0001.jsonl"
+        self.flip(records, 3)
+        said = f"{records.name}: the record at byte 0 is damaged, but others follow it"
+        self.assertIn(said + "; --overwrite computes the runs of this shard again", self.sweep("a", status=3).stderr)
+        self.assertIn(said, self.call("merge", "a", status=3).stderr)
+        self.sweep("a", "--overwrite")
+        self.assertEqual(self.tables("a"), before)
+        for mine in ('{"my": 1}\n', 'x"xxh3":"0123"}\n'):
+            records.write_text(mine)
+            for arguments in ((), ("--overwrite",)):
+                self.assertIn(f"{records.name}: is there, but a sweep did not write it", self.sweep("a", *arguments, status=2).stderr)
+            self.assertEqual(records.read_text(), mine)
+
+    def test_a_signal_ends_the_wait_for_a_folder(self):
+        self.sweep("a")
+        for folder, arguments in (("a", ()), ("a", ("--overwrite",)), ("new", ())):
+            lock = self.folder / folder / "shards/lock"
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            with open(lock, "w") as file:
+                fcntl.flock(file, fcntl.LOCK_EX)
+                process = subprocess.Popen([NEPHOS, "sweep", self.null, "--steps", "20", "--replicates", "1", "--out", folder, *arguments],
+                                           cwd=self.folder, env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+                time.sleep(1)
+                self.assertIsNone(process.poll())
+                begin = time.monotonic()
+                process.send_signal(signal.SIGTERM)
+                said = process.communicate(timeout=20)[1]
+                self.assertLess(time.monotonic() - begin, 1)
+                self.assertEqual(process.returncode, 143)
+                self.assertIn("stopped after 0 of 1 runs", said)
+        # Who has the folder later goes on.
+        self.assertFalse((self.folder / "new/sweep.toml").exists())
+        self.call("sweep", self.null, "--steps", "20", "--replicates", "1", "--out", "new")
+
+    def test_a_torn_line_of_times_is_dropped(self):
+        self.sweep("a")
+        times = self.folder / "a/timing.csv"
+        whole = times.read_text()
+        for torn in ("0,1,1,4,0.", "0"):
+            times.write_text(whole + torn)
+            self.sweep("a", "--overwrite")
+            lines = times.read_text().splitlines()
+            self.assertEqual("\n".join(lines[:-1]) + "\n", whole)
+            self.assertRegex(lines[-1], r"\A0,1,\d+,4,\d+\.\d{3}\Z")
+        times.write_text("shard,shards,wor")
+        self.sweep("a", "--overwrite")
+        self.assertEqual(times.read_text().splitlines()[0], "shard,shards,workers,runs,wall_s")
+
+    def test_a_fit_names_damaged_records_beside_its_own(self):
+        fit = self.write("fit.toml", """\
+scene = "null.toml"
+runs = 10
+proof = 0
+steps = { min = 200, max = 1600 }
+[[parameter]]
+key = "field.background.ext"
+prior = { from = 0.08, to = 0.12 }
+[[target]]
+statistic = "cover"
+value = 0.16
+sd = 0.02
+""")
+        self.call("fit", fit, "--out", "fit")
+        found = (self.folder / "fit/fit.json").read_bytes()
+        shards = self.folder / "fit/wave-1/shards"
+        other = shards / "0000-of-0002.jsonl"
+        shutil.copy(shards / "0000-of-0001.jsonl", other)
+        shutil.copy(shards / "0000-of-0001.series", other.with_suffix(".series"))
+        self.flip(other, 20)
+        result = self.call("fit", fit, "--out", "fit", status=3)
+        self.assertIn(f"error: fit/wave-1/shards/{other.name}: the record at byte 0 is damaged", result.stderr)
+        self.assertIn("fitted.toml", result.stdout)
+        self.assertEqual((self.folder / "fit/fit.json").read_bytes(), found)
 
 
 if __name__ == "__main__":
