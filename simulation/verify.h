@@ -32,7 +32,8 @@ struct VerifyOptions {
     int replay = 0;
     // The largest change of a voxel from frame to frame that passes; none: it is reported and always passes.
     std::optional<double> max_change;
-    // Makes a seam that is rougher than the inside a failure, also of an axis that is not periodic.
+    // Makes a seam that shows (Seam::shows) a failure, also of an axis that is not periodic. Otherwise it is reported: of few
+    // planes with little cloud the roughest lies at the seam by chance.
     bool seam = false;
 };
 

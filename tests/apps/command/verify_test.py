@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import unittest
 
-from case import Case, NEPHOS, SCENE, unsealed
+from case import Case, NEPHOS, SCENE, SOURCE, unsealed
 
 PLACED = SCENE + """\
 [georeference]
@@ -178,6 +178,13 @@ class Verify(Case):
         self.assertEqual(self.checks("a")["frames"]["detail"], "of statistics alone")
         self.assertEqual(self.failed("a", "--against", "c"), ["against"])
         self.assertIn("it has 5 steps, not 7", self.call("verify", "a", "--against", "short", status=1).stdout)
+
+    def test_a_seam_that_shows_by_chance(self):
+        """In a small box with few clouds the roughest plane may be one at the seam: a failure only where no seam may show."""
+        self.call("run", SOURCE / "scenes/shafts.toml", "--set", "lattice.cells=[24,20,12]", "--set", "time.steps=6", "--set",
+                  "frames={count=1}", "--no-render", "--out", "out")
+        self.assertIn("(the seam shows)", self.checks("out")["seam"]["detail"])
+        self.assertEqual(self.failed("out", "--seam"), ["seam"])
 
     def test_impossible_numbers_and_paths_of_a_manifest(self):
         self.call("run", self.scene, "--no-render", "--out", "whole")
