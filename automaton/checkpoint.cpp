@@ -140,29 +140,32 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
     if (!state) throw std::bad_alloc();
     XXH3_128bits_reset(state.get());
     // Piece by piece: the planes are large, and there is no room for a copy of them.
-    write_pieces_atomically(path, [&](const AppendPiece& append) {
-        const auto put = [&](std::span<const std::byte> bytes) {
-            XXH3_128bits_update(state.get(), bytes.data(), bytes.size());
-            append(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
-        };
-        ByteWriter head;
-        head.put(kMagic);
-        head.put(kFormatVersion);
-        head.put(kRandomStreamVersion);
-        head.put_bytes(std::as_bytes(std::span(checkpoint.simulation_hash)));
-        head.put(checkpoint.state.high);
-        head.put(checkpoint.state.low);
-        head.put(checkpoint.steps);
-        put(head.bytes());
-        for (const auto* block : {&checkpoint.automaton, &checkpoint.history}) {
-            const std::uint64_t size = block->size();
-            put(std::as_bytes(std::span(&size, 1)));
-            put(*block);
-        }
-        const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
-        put(std::as_bytes(std::span(&hash.high64, 1)));
-        put(std::as_bytes(std::span(&hash.low64, 1)));
-    });
+    write_pieces_atomically(
+        path,
+        [&](const AppendPiece& append) {
+            const auto put = [&](std::span<const std::byte> bytes) {
+                XXH3_128bits_update(state.get(), bytes.data(), bytes.size());
+                append(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+            };
+            ByteWriter head;
+            head.put(kMagic);
+            head.put(kFormatVersion);
+            head.put(kRandomStreamVersion);
+            head.put_bytes(std::as_bytes(std::span(checkpoint.simulation_hash)));
+            head.put(checkpoint.state.high);
+            head.put(checkpoint.state.low);
+            head.put(checkpoint.steps);
+            put(head.bytes());
+            for (const auto* block : {&checkpoint.automaton, &checkpoint.history}) {
+                const std::uint64_t size = block->size();
+                put(std::as_bytes(std::span(&size, 1)));
+                put(*block);
+            }
+            const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+            put(std::as_bytes(std::span(&hash.high64, 1)));
+            put(std::as_bytes(std::span(&hash.low64, 1)));
+        },
+        Folders::expected);
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& path) {

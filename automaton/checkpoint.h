@@ -29,7 +29,7 @@ struct Checkpoint {
     std::vector<std::byte> history;    // the caller's own state
 };
 
-// Writes atomically; throws Error(io).
+// Writes atomically, into a folder that is there; throws Error(io).
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
 
 // Reads a checkpoint and verifies magic, versions, sizes against the file's, and the hash of the content.

@@ -33,7 +33,8 @@ enum class Folders {
 // one.
 class AtomicFile {
   public:
-    // Creates an empty temporary file whose name nobody can foresee beside `path`. Symbolic
+    // Creates an empty temporary file whose name nobody can foresee beside `path`; missing parent folders as `folders` has
+    // it. Symbolic
     // links of this user or of root keep pointing to the new file, also where it is not there yet; one of another user, a
     // device, a pipe or a folder in the place of the file is refused. Throws Error(io) naming `path`.
     explicit AtomicFile(const std::filesystem::path& path, Access access = Access::shared,

@@ -82,8 +82,8 @@ inline Rotation sin_cos_deg(double degrees) {
 // Returns from * (to / from)^unit for positive ends and a unit of 0 to 1: as std::pow() gives it, but for a few parts in
 // 10^15, and the same bits with every C library, as square roots are rounded alike everywhere. Pure.
 inline double geometric(double from, double to, double unit) {
-    double root = to / from, power = unit >= 1 ? root : 1;
-    if (unit >= 1) return from * power;
+    if (unit >= 1) return to;
+    double root = to / from, power = 1;
     for (int bit = 0; bit < 64 && unit > 0; ++bit) {  // binary digits of the unit
         root = std::sqrt(root);
         unit *= 2;

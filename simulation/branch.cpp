@@ -183,6 +183,16 @@ Simulation branched_simulation(const RunSettings& settings, const RunFolder& fol
 
 void require_tables_of_other_run(const RunSettings& settings, std::uint64_t steps) {
     const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
+    if (is_there(parent.manifest())) {
+        const EarlierRun run = read_manifest(parent.manifest());
+        if (run.simulation_hash != settings.branch->simulation_hash)
+            throw Error(
+                ErrorCode::io,
+                fmt::format("{}: is not of the run in the folder that it lies in, whose statistics the "
+                            "branch begins with",
+                            settings.branch->checkpoint.string()));
+        require_table_of_run(parent.statistics(), run.steps_reported, run.state_hash);
+    }
     read_statistics(parent.statistics(), steps, {}, kStatisticsHeader);
     for (const LayerOptions& layer : settings.scene.layers)
         read_statistics(parent.statistics(layer.name), steps, {}, kLayerStatisticsHeader);

@@ -424,6 +424,7 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
         run.range.first_frame = frame_number(json.at("range").at("first_frame"), path);
         run.range.last_frame = frame_number(json.at("range").at("last_frame"), path);
         run.steps_reported = json.at("steps").at("reported").get<std::uint64_t>();
+        run.state_hash = json.at("steps").value("state_hash", std::string());
         if (json.contains("parameters")) {
             for (const auto& [key, value] : json.at("parameters").items())
                 run.parameters.emplace_back(key, value.get<std::string>());

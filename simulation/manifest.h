@@ -100,6 +100,7 @@ struct EarlierRun {
     bool render = true;
     SimulationRange range;
     std::uint64_t steps_reported = 0;
+    std::string state_hash;  // at the last of these
     // Of scenes/format/writer.h: keys of its scene that are not at their defaults.
     std::vector<std::pair<std::string, std::string>> parameters;
     std::vector<RunInput> inputs;       // none in manifests of earlier versions

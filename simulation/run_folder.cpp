@@ -8,6 +8,8 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "automaton/checkpoint.h"
 #include "core/error.h"
 #include "core/paths.h"
@@ -107,6 +109,8 @@ class Recorder : public SimulationSink {
                 state_.frames.push_back({number, time_s, step, hash, {}});
             }
         };
+        const EarlierRun earlier = read_manifest(folder_.manifest());
+        require_table_of_run(folder_.statistics(), earlier.steps_reported, earlier.state_hash, kStartAnew);
         // Frames before the first row of their step cannot be: a range of frames reports every step from 0.
         statistics_ = StatisticsFile::resume(folder_.statistics(), simulation.next_step(), record_frames_of);
         frames_done_ = int(state_.frames.size());
@@ -122,7 +126,20 @@ class Recorder : public SimulationSink {
         for (FrameRecord& frame : state_.frames) {
             frame.files = std::move(files[frame.number]);
             if (frame.files.empty()) frame.files = digests_of_frame(frame.number);
+            for (const FileRecord& file : frame.files) require_size(file);
         }
+    }
+
+    // Throws Error(io) when something else has taken the place of a file, or a part of it.
+    void require_size(const FileRecord& file) const {
+        const std::filesystem::path path = folder_.folder / file.path;
+        std::error_code error;
+        const bool is_file = std::filesystem::is_regular_file(path, error);
+        if (!error && is_file && std::filesystem::file_size(path, error) == file.digest.bytes) return;
+        throw Error(
+            ErrorCode::io,
+            fmt::format("{}: is not the file of {} bytes that was written: start anew with --overwrite",
+                        path.string(), file.digest.bytes));
     }
 
     // Throws Error(io) when a file of a frame that is done is not there.

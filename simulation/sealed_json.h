@@ -31,7 +31,7 @@ std::string sealed_text(std::string_view object);
 enum class Seal {
     whole,
     broken,
-    none,  // the list of an earlier version
+    none,  // the list of an earlier version, or one whose checksum was taken out
 };
 
 // Judges the bytes of a list that is JSON. Throws Error(io) as open_regular_file(). Thread-safe.

@@ -95,6 +95,26 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
     return bytes;
 }
 
+void require_table_of_run(const std::filesystem::path& path, std::uint64_t steps, const std::string& hash,
+                          std::string_view cure) {
+    if (steps == 0 || hash.empty()) return;
+    StateHash last;
+    try {
+        read_statistics(path, steps,
+                        [&](std::uint64_t, std::string_view, const StateHash& of_row) { last = of_row; });
+    } catch (const ReadFailure&) {
+        throw;
+    } catch (const Error&) {
+        return;  // cut after the manifest was written, or damaged, which its reader says
+    }
+    if (last.hex() != hash)
+        throw Error(
+            ErrorCode::io,
+            fmt::format("{}: step {} has another state than in manifest.json: the table is of another "
+                        "run{}",
+                        path.string(), steps - 1, cure));
+}
+
 bool is_statistics(const std::filesystem::path& path, std::string_view header) {
     const std::optional<std::string> text = beginning_of(path, header.size());
     return text == header;

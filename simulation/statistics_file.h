@@ -40,6 +40,11 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
                               const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader,
                               std::string_view cure = {});
 
+// Throws Error(io) when the last of `steps` rows has another state than `hash`: then the table is of another run. A table that
+// has fewer rows passes.
+void require_table_of_run(const std::filesystem::path& path, std::uint64_t steps, const std::string& hash,
+                          std::string_view cure = {});
+
 // The cure where the run itself is called again.
 inline constexpr std::string_view kStartAnew = "; --overwrite instead of --resume starts the run anew";
 

@@ -181,6 +181,9 @@ class Frames {
         if (!is_too_large(*last_)) motion_.add(*last_);
     }
 
+    // A frame cannot be compared with the next one.
+    void skip() { motion_.skip(); }
+
     void checks(const VerifyOptions& options, std::vector<Check>& checks) const {
         if (compared_ > 0) {
             checks.push_back(sums_.check(
@@ -263,10 +266,16 @@ void check_content(const RunListing& run, const VerifyOptions& options, std::vec
     Problems unread;
     std::map<std::string, DensityGrid> grids;
     std::size_t next = 0;
+    bool is_whole = true;  // all files of the frame could be read
     const auto finish_file = [&] {
         const ListedFrame* frame = sources[next].frame;
-        if (++next == sources.size() || sources[next].frame != frame)
+        if (++next < sources.size() && sources[next].frame == frame) return;
+        if (is_whole)
             frames.add(*frame, std::exchange(grids, {}));
+        else
+            frames.skip();
+        grids.clear();
+        is_whole = true;
     };
     const auto take = [&](LoadedDensity&& loaded) {
         const auto& [frame, file] = sources[next];
@@ -287,6 +296,7 @@ void check_content(const RunListing& run, const VerifyOptions& options, std::vec
                 take(load_density(paths[next], reading));
             } catch (const ReadFailure& failure) {  // which says nothing of its content
                 unread.add(failure.what());
+                is_whole = false;
                 finish_file();
             } catch (const Error& alone) {
                 if (!std::string_view(alone.what()).starts_with(paths[next].string())) throw;  // nor this

@@ -15,6 +15,8 @@ namespace nephos {
 class SequenceMotion {
   public:
     void add(const DensityGrid& grid);
+    // A frame is missing: the next one is compared with none.
+    void skip() { before_.clear(); }
     // Returns the check `motion`: the largest change of a voxel from frame to frame, which must not be above `most` where that
     // is given, and that of the sum of gradients along x, by which pulsing between steps shows.
     Check check(const std::optional<double>& most) const;

@@ -44,8 +44,7 @@ std::string canonical_number_or_word(const std::string& value) {
 
 std::string canonical_value(const std::string& value, bool of_text) {
     std::string text = canonical_number_or_word(value);
-    const bool is_number = text != value && !is_compound(text) && !text.starts_with('"');
-    return of_text && is_number ? toml_string(value) : text;
+    return of_text && !is_compound(text) && !text.starts_with('"') ? toml_string(value) : text;
 }
 
 bool take_text(const std::vector<std::string>& keys) {

@@ -18,6 +18,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "simulation/layer_simulation.h"
 
@@ -44,9 +45,9 @@ std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem:
     base.overrides = table.texts("set");
     base.layer = table.text("layer").value_or("");
     if (!table.has("scene")) table.report("scene", "the fit has no scene", "expected scene = \"FILE.toml\"");
-    if (scene && scene->empty())
+    if (scene && names_no_file(*scene))
         table.report("scene", "`scene` names no file", "expected scene = \"FILE.toml\"");
-    if (!scene || scene->empty()) return std::nullopt;
+    if (!scene || names_no_file(*scene)) return std::nullopt;
     base.scene_file = folder / *scene;
     try {
         base.source.emplace(base.scene_file);

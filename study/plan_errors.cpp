@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/plan_errors.h"
 
-#include <optional>
+#include <algorithm>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "core/text.h"
 #include "scenes/format/document.h"
 #include "scenes/format/override.h"
 
@@ -23,26 +22,35 @@ Problem problem_at(const SweepOptions& options, PlanPlace place, std::string mes
     return document.problem_at({origin, place.line, place.column}, std::move(message), std::move(expected));
 }
 
-// Returns the place in an axis of what an option sets; none where it is not of the axis.
-std::optional<PlanPlace> place_of(const SourcePosition& where, const Axis& axis) {
-    std::vector<std::string> values = axis.values;
-    if (values.empty()) values = {number_text(axis.from), number_text(axis.to)};
-    for (std::size_t key = 0; key < axis.keys.size(); ++key)
-        for (std::size_t n = 0; n < values.size(); ++n)
-            if (where.file == option_label(axis.keys[key] + "=" + values[n]))
-                return where.column <= int(axis.keys[key].size()) ? place_of_key(axis, key)
-                                                                  : place_of_value(axis, n);
-    return {};
+// An option with which the scene is read, and where it stands in the plan.
+struct PlacedOption {
+    std::string label;
+    std::size_t key_size;  // columns up to there are of the key
+    PlanPlace key, value;
+};
+
+std::vector<PlacedOption> placed_options(const SweepOptions& options, const std::vector<ValueInUse>& values) {
+    std::vector<PlacedOption> all;
+    for (std::size_t n = 0; n < options.overrides.size(); ++n) {
+        const PlanPlace place = n < options.override_places.size() ? options.override_places[n] : PlanPlace{};
+        all.push_back({option_label(options.overrides[n]), 0, place, place});
+    }
+    for (const ValueInUse& one : values) {
+        const Axis& axis = options.axes[one.axis];
+        for (std::size_t key = 0; key < axis.keys.size(); ++key)
+            all.push_back({option_label(axis.keys[key] + "=" + one.value), axis.keys[key].size(),
+                           place_of_key(axis, key), one.place});
+    }
+    return all;
 }
 
-// Returns the place of the option that a problem is of; nowhere where it is of the scene's own text.
-PlanPlace place_of(const Problem& problem, const SweepOptions& options) {
+// Returns the place of the option that a problem is of; nowhere where it is of the scene's own text, or of one of several.
+PlanPlace place_of(const Problem& problem, const std::vector<PlacedOption>& options) {
     if (problem.where.line > 0) return {};
-    for (const Axis& axis : options.axes)
-        if (const std::optional<PlanPlace> place = place_of(problem.where, axis)) return *place;
-    for (std::size_t n = 0; n < options.override_places.size(); ++n)
-        if (problem.where.file == option_label(options.overrides[n])) return options.override_places[n];
-    return {};
+    const auto is_its = [&](const PlacedOption& one) { return one.label == problem.where.file; };
+    if (std::ranges::count_if(options, is_its) != 1) return {};
+    const PlacedOption& one = *std::ranges::find_if(options, is_its);
+    return problem.where.column <= int(one.key_size) ? one.key : one.value;
 }
 
 }  // namespace
@@ -66,13 +74,15 @@ PlanPlace place_of_value(const Axis& axis, std::size_t n) {
     return n + 1 >= axis.values.size() ? axis.places.to : axis.places.range;
 }
 
-void read_placed(const SweepOptions& options, const std::function<void()>& read) {
+void read_placed(const SweepOptions& options, const std::vector<ValueInUse>& values,
+                 const std::function<void()>& read) {
     try {
         read();
     } catch (const SceneErrors& errors) {
         std::vector<Problem> problems = errors.problems();
+        const std::vector<PlacedOption> placed = placed_options(options, values);
         for (Problem& problem : problems) {
-            const PlanPlace place = place_of(problem, options);
+            const PlanPlace place = place_of(problem, placed);
             if (is_known(options, place))
                 problem = problem_at(options, place, problem.message, problem.expected);
         }

@@ -95,7 +95,7 @@ std::vector<const PlacedRecord*> with_damaged_series(const std::vector<PlacedRec
                                                      const std::filesystem::path& path) {
     std::vector<const PlacedRecord*> order, damaged;
     for (const PlacedRecord& one : records)
-        if (!one.record.series_xxh3.empty()) order.push_back(&one);
+        if (one.is_sound && !one.record.series_xxh3.empty()) order.push_back(&one);
     if (order.empty()) return damaged;
     std::ranges::sort(order, {}, [](const PlacedRecord* one) { return one->record.series_offset; });
     std::ifstream stream = open_stream(path);
@@ -116,17 +116,12 @@ std::vector<const PlacedRecord*> with_damaged_series(const std::vector<PlacedRec
 
 }  // namespace
 
-std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesystem::path& path,
-                                                            RecordsFor use) {
+std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesystem::path& path, RecordsFor use,
+                                                            SeriesCheck check) {
     std::ifstream stream = open_stream(path);
     const auto shard = std::uint32_t(files_.size());
     files_.push_back({std::filesystem::path(path).replace_extension(".series"), folders_ - 1});
-    // Series are written before the records that name them: fewer are damage, and not to be filled with zeros.
     const std::filesystem::path& series_path = files_.back().path;
-    std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(series_path, error);
-    if (error && is_there(series_path)) throw ReadFailure(series_path, error.message(), "examine");
-    const std::uint64_t stored = error ? 0 : size;
     std::uint64_t at = 0, bytes = 0, series = 0;
     std::string problem;
     const auto note = [&](std::uint64_t place, std::string_view message) {
@@ -149,15 +144,6 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
                 note(at, "has impossible numbers");
                 continue;
             }
-            if (!record.failed) {
-                const std::uint64_t end = record.series_offset + record.series_bytes;
-                if (end > stored) {
-                    note(at, fmt::format("names {} bytes of {}, which has fewer: {}", end,
-                                         series_path.filename().string(), stored));
-                    continue;
-                }
-                series = std::max(series, end);
-            }
             found.push_back({at, std::move(record)});
         } catch (const nlohmann::json::exception&) {
             note(at, "is not of a run");
@@ -166,7 +152,27 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
             note(at, fmt::format("is not of a run: {}", wrong.what()));
         }
     }
-    for (const PlacedRecord* one : with_damaged_series(found, series_path)) {
+    check_reading(stream, path);
+    // Series are written before the records that name them: fewer are damage, and not to be filled with zeros. Their size is
+    // asked for after the last record was read, as another process may be writing both.
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(series_path, error);
+    if (error && is_there(series_path)) throw ReadFailure(series_path, error.message(), "examine");
+    const std::uint64_t stored = error ? 0 : size;
+    for (PlacedRecord& one : found) {
+        if (one.record.failed) continue;
+        const std::uint64_t end = one.record.series_offset + one.record.series_bytes;
+        one.is_sound = end <= stored;
+        if (one.is_sound)
+            series = std::max(series, end);
+        else
+            note(one.at, fmt::format("names {} bytes of {}, which has fewer: {}", end,
+                                     series_path.filename().string(), stored));
+    }
+    const std::vector<const PlacedRecord*> damaged = check == SeriesCheck::all
+                                                         ? with_damaged_series(found, series_path)
+                                                         : std::vector<const PlacedRecord*>{};
+    for (const PlacedRecord* one : damaged) {
         note(one->at,
              fmt::format("is of run {}, whose packed series are damaged, at byte {} of {}", one->record.id,
                          one->record.series_offset, series_path.filename().string()));
@@ -174,7 +180,6 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
     }
     for (PlacedRecord& one : found)
         if (one.is_sound) take(std::move(one.record));
-    check_reading(stream, path);
     if (!problem.empty()) problems_.push_back(problem);
     return {bytes, series};
 }
@@ -189,7 +194,7 @@ void Records::take(RunRecord record) {
     }
 }
 
-Records Records::read(const std::vector<std::filesystem::path>& folders, RecordsFor use) {
+Records Records::read(const std::vector<std::filesystem::path>& folders, RecordsFor use, SeriesCheck check) {
     Records records;
     for (const std::filesystem::path& folder : folders) {
         ++records.folders_;
@@ -202,7 +207,7 @@ Records Records::read(const std::vector<std::filesystem::path>& folders, Records
         }
         for (const std::filesystem::path& file : files) {
             try {
-                records.read_shard(file, use);
+                records.read_shard(file, use, check);
             } catch (const ReadFailure& problem) {
                 // All runs of it would be done once more, though nothing is wrong with it.
                 if (use == RecordsFor::running) throw;
@@ -278,7 +283,7 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
     if (separate_from_links(series_path_)) files_->series = open_regular_file(series_path_, kOwn);
     Records records;
     records.folders_ = 1;
-    const auto [bytes, series] = records.read_shard(path_, RecordsFor::running);
+    const auto [bytes, series] = records.read_shard(path_, RecordsFor::running, SeriesCheck::all);
     if (!records.problems().empty())
         throw Error(ErrorCode::io,
                     records.problems().front() + "; --overwrite computes the runs of this shard again");

@@ -45,13 +45,16 @@ enum class RecordsFor {
     showing,  // by one that writes no records
 };
 
+// Which packed series are compared with their hashes: it takes a pass over all of them.
+enum class SeriesCheck { all, none };
+
 // All records of some shards, the last of each run; failed ones where there is no other.
 class Records {
   public:
     // Reads every shard of the folders. What cannot be read, or is damaged, is left out, and stands in problems(). Throws
     // Error(usage) when records are of another version of the statistics or of the random stream: which, and what helps.
     static Records read(const std::vector<std::filesystem::path>& folders,
-                        RecordsFor use = RecordsFor::running);
+                        RecordsFor use = RecordsFor::running, SeriesCheck check = SeriesCheck::all);
 
     // "PATH: what is wrong", one a file; the torn last record of a shard is no problem. A run whose packed series are not as
     // they were written is left out.
@@ -73,7 +76,8 @@ class Records {
     };
     // Reads a shard, and gives back the bytes of its records and those of the series that they refer to. Throws Error(io)
     // when it cannot be opened.
-    std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path, RecordsFor use);
+    std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path, RecordsFor use,
+                                                       SeriesCheck check);
 
     // Keeps the last record of a run, but none of a failure where there is another.
     void take(RunRecord record);

@@ -13,6 +13,7 @@
 
 #include "study/folder_contents.h"
 #include "study/folder_guard.h"
+#include "study/plan_memory.h"
 #include "study/shard_files.h"
 #include "study/sweep_file.h"
 #include "study/workers.h"
@@ -174,6 +175,15 @@ SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records&
     return report;
 }
 
+int workers_for(const SweepJob& job, const SweepProgress& count) {
+    return int(std::min<std::uint64_t>(std::uint64_t(job.workers), count.in_all - count.done));
+}
+
+// Throws Error(usage) unless the workers that are left something to do fit into memory with a run each.
+void require_memory_for_runs(const SweepPlan& plan, const SweepJob& job, const SweepProgress& count) {
+    if (const int workers = workers_for(job, count); workers > 0) require_memory_for(plan, workers);
+}
+
 }  // namespace
 
 void write_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
@@ -207,6 +217,7 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<bool()>& stop) {
     const Clock::time_point begin = Clock::now();
     require_sweep_folder(job.folder);
+    if (!is_there(job.folder)) require_memory_for_runs(plan, job, status_of(plan, job, Records()).progress);
     std::optional<FolderGuard> guard(std::in_place, job.folder, stop);
     if (!guard->is_held()) {  // stopped while another process had the folder
         SweepReport report = status_of(plan, job, Records::read({job.folder}));
@@ -214,9 +225,10 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
         return report;
     }
     require_place_for(plan, *guard, job.folder);
-    if (job.overwrite) remove_shards(job.folder, job.shard, job.shards);
-    // Whoever overwrites does not ask what other shards have done: they may be of another version.
-    Records records = job.overwrite ? Records() : Records::read({job.folder});
+    // Whoever overwrites does not ask what other shards have done: they may be of another version. Of many shards each compares
+    // its own series, when it is opened.
+    const SeriesCheck check = job.shards == 1 ? SeriesCheck::all : SeriesCheck::none;
+    Records records = job.overwrite ? Records() : Records::read({job.folder}, RecordsFor::running, check);
     SweepReport report = status_of(plan, job, records);
     SweepProgress& count = report.progress;
     const auto is_wanted = [&](const PlannedRun& run) {
@@ -230,6 +242,10 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
         count.failed = 0;
         report.failures.clear();
     }
+    WorkerOptions workers;
+    workers.count = workers_for(job, count);
+    require_memory_for_runs(plan, job, count);
+    if (job.overwrite) remove_shards(job.folder, job.shard, job.shards);
     std::optional<Shard> opened;
     if (count.done < count.in_all) opened.emplace(job.folder, job.shard, job.shards);
     place_plan(plan, job.folder);
@@ -273,8 +289,6 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
         }
         ++count.done;
     };
-    WorkerOptions workers;
-    workers.count = int(std::min<std::uint64_t>(std::uint64_t(job.workers), count.in_all - count.done));
     workers.stop = stop;
     workers.idle = [&] {
         if (progress) progress(count);

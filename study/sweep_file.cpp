@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/math.h"
 #include "core/text.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/text.h"
 #include "simulation/layer_simulation.h"
 
@@ -167,7 +168,7 @@ SweepOptions read_sweep_text(std::string text, const std::filesystem::path& path
         const std::optional<std::string> scene = table.text("scene");
         if (!scene && !table.has("scene"))
             table.report("scene", "the sweep has no scene", "expected scene = \"FILE.toml\"");
-        if (scene && scene->empty())
+        if (scene && names_no_file(*scene))
             table.report("scene", "`scene` names no file", "expected scene = \"FILE.toml\"");
         options.scene_file = path.parent_path() / scene.value_or("");
         options.overrides = table.texts("set");
@@ -187,7 +188,10 @@ SweepOptions read_sweep_text(std::string text, const std::filesystem::path& path
         options.layer_place = place_in(table, "layer");
         options.tracks_place = place_in(table, "tracks");
         table.table("steps", [&](TomlTable& steps) { read_steps(steps, options.steps); });
-        const std::filesystem::path folder = path.parent_path() / table.text("folder").value_or("");
+        const std::optional<std::string> place = table.text("folder");
+        if (place && names_no_file(*place))
+            table.report("folder", "`folder` names no folder", "expected that of files among the values");
+        const std::filesystem::path folder = path.parent_path() / place.value_or("");
         table.tables("axis", [&](TomlTable& axis) { read_axis(axis, folder, options); });
     });
     return options;

@@ -92,7 +92,7 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     }
     check_options(options_);
     if (!options_.source) options_.source.emplace(options_.scene_file);
-    read_placed(options_, [&] {
+    read_placed(options_, {}, [&] {
         scene_ = options_.source->read(options_.overrides, SceneUse::without_frames);
         stamps_ = stamps_of(scene_, {FileKind::first_state, FileKind::simulation});
     });
@@ -114,7 +114,7 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     require_different_points(check_axes());
     scene_.frames = {};  // of a study nothing is drawn
     scene_.frames.enabled = false;
-    simulation_hash_ = simulation_start(scene_).simulation_hash;
+    read_placed(options_, {}, [&] { simulation_hash_ = simulation_start(scene_).simulation_hash; });
 }
 
 void SweepPlan::check_measured(const Axis& axis, std::size_t n, const std::string& value,
@@ -167,7 +167,7 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
             };
             Scene scene;
             std::optional<AxisFiles> files;
-            read_placed(options_, [&] {
+            read_placed(options_, {{a, place_of_value(axis, n), values[n]}}, [&] {
                 scene = options_.source->read(overrides, SceneUse::without_frames);
                 check_measured(axis, n, values[n], scene);
                 with_place(options_, place_of_value(axis, n), "",
@@ -190,10 +190,20 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
         }
     }
     // Values that are good alone may contradict each other.
-    read_placed(options_, [&] {
-        if (points_ > 0) measured_lattice(scene_of(run(0)), options_.layer);
-        if (points_ > 1) measured_lattice(scene_of(run(runs() - 1)), options_.layer);
-    });
+    for (const std::uint64_t point : {std::uint64_t(0), points_ - 1}) {
+        if (point >= points_) continue;
+        const PlannedRun one = run(point * options_.replicates);
+        std::vector<ValueInUse> in_use;
+        for (std::size_t a = 0; a < options_.axes.size(); ++a) {
+            const Axis& axis = options_.axes[a];
+            in_use.push_back({a,
+                              is_sampled(options_.design)
+                                  ? axis.places.range
+                                  : place_of_value(axis, point == 0 ? 0 : axis.values.size() - 1),
+                              one.values[a]});
+        }
+        read_placed(options_, in_use, [&] { measured_lattice(scene_of(one), options_.layer); });
+    }
     return equals;
 }
 

@@ -46,13 +46,15 @@ std::vector<std::string> expected_lines(const std::string& path) {
     for (; stream.getline(line.data(), kLongest); ++number) {
         std::string_view text = line.data();
         if (text.ends_with('\r')) text.remove_suffix(1);
-        if (std::size_t(stream.gcount()) > line.find('\0') + 1)
+        const std::size_t read =
+            std::size_t(stream.gcount()) - (stream.eof() ? 0 : 1);  // without the end of the line
+        if (line.find('\0') < read)
             throw Error(ErrorCode::usage, fmt::format("{}:{}: holds a byte that no text has", path, number));
         if (!text.empty() && text.front() != '#') lines.emplace_back(text);
     }
     if (!stream.eof() && !stream.bad())
         throw Error(ErrorCode::usage,
-                    fmt::format("{}: line {} has {} bytes or more: expected lines such as `nephos hash` "
+                    fmt::format("{}: line {} has more than {} bytes: expected lines such as `nephos hash` "
                                 "prints them",
                                 path, number, kLongest - 1));
     if (stream.bad()) throw Error(ErrorCode::io, path + ": cannot read: " + std::strerror(errno));

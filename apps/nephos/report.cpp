@@ -48,7 +48,9 @@ int report(const ReportArguments& a) {
                         "merge` made are shown by `nephos report` of the folders that were merged");
     const std::filesystem::path out = a.out.empty() ? std::filesystem::path(a.folders.front()) / "report.html"
                                                     : std::filesystem::path(a.out);
-    if (!is_empty_file(out)) require_own(out, kReportBeginning, "`nephos report`");
+    // The lock of a sweep is empty, too.
+    const bool may_be_lock = out.filename() == "lock" && out.parent_path().filename() == "shards";
+    if (may_be_lock || !is_empty_file(out)) require_own(out, kReportBeginning, "`nephos report`");
     write_report(plan, records, out);
     print_problems(records.problems());
     if (!a.work.quiet)

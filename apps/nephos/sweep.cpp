@@ -11,7 +11,6 @@
 
 #include "study/folder_contents.h"
 #include "study/folder_guard.h"
-#include "study/plan_memory.h"
 #include "study/shard_files.h"
 #include "study/sweep_file.h"
 #include "study/tables.h"
@@ -22,6 +21,7 @@
 #include "apps/nephos/commands.h"
 #include "apps/nephos/emit.h"
 #include "apps/nephos/terminal.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "simulation/layer_simulation.h"
@@ -96,7 +96,10 @@ SweepOptions options_of(const SweepArguments& a) {
     if (a.steps) options.steps = {a.steps->first, a.steps->second, options.steps.until};
     if (a.until) options.steps.until = a.until;
     if (a.clouds_every) options.clouds_every = int(*a.clouds_every);
-    if (a.tracks) options.tracks = true;
+    if (a.tracks) {
+        options.tracks = true;
+        options.tracks_place = {};
+    }
     if (!a.layer.empty()) {
         options.layer = a.layer;
         options.layer_place = {};
@@ -224,8 +227,6 @@ int sweep(const SweepArguments& a) {
         output.line(next);
         return 0;
     }
-    require_memory_for(plan, int(std::min<std::uint64_t>(std::uint64_t(job.workers),
-                                                         std::max<std::uint64_t>(plan.runs(), 1))));
     if (!a.work.quiet && !a.work.json) print_note(describe(plan));
     std::unique_ptr<ProgressBar> bar;
     defer_signals();
@@ -282,10 +283,13 @@ struct MergeArguments {
 
 int merge(const MergeArguments& a) {
     const ThreadLimit limit(1);
+    const std::string out = a.out.empty() ? a.folders.front() : a.out;
+    // From before the plan and the records are read until the tables are written, no sweep makes others of the folder.
+    std::optional<FolderGuard> guard;
+    if (is_there(std::filesystem::path(out) / "shards")) guard.emplace(out);
     const SweepPlan plan = plan_of_folder(a.folders.front());
     std::vector<std::filesystem::path> folders(a.folders.begin(), a.folders.end());
     const Records records = records_of_folders(plan, folders);
-    const std::string out = a.out.empty() ? a.folders.front() : a.out;
     print_problems(records.problems());
     require_sweep_folder(out);
     const LostRuns lost = a.overwrite ? LostRuns{} : runs_lost(plan, records, out);

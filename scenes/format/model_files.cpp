@@ -7,6 +7,7 @@
 #include "core/descriptor.h"
 #include "core/paths.h"
 #include "scenes/format/document.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
@@ -57,7 +58,7 @@ class ModelFiles {
     // Adds the [[model]] tables of a file; `name` is the item of `models` that names it. Returns false when there are
     // too many files, or they are too large, which is reported as any other problem.
     bool add(const Node& name, const std::string& path_of_item, std::vector<Node>& models) {
-        if (name.text.empty() || name.text.find('\0') != std::string::npos) {
+        if (names_no_file(name.text)) {
             document_.report(name.place, enclosed(path_of_item, '`') + " names no file");
             return true;
         }

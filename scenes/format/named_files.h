@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "scenes/format/scene.h"
@@ -25,6 +26,9 @@ enum class FileKind {
 // Makes them relative to the folder of the text that names them: `folder` for the scene's own, none for options. Fills in
 // Scene::file_places. `document`: that the scene was read from, without problems.
 void resolve_files(Scene& scene, const Document& document, const std::filesystem::path& folder);
+
+// Returns whether a text cannot be the name of a file: it is empty, or has a byte of 0, at which the system's name would end.
+inline bool names_no_file(std::string_view text) { return text.empty() || text.find('\0') != text.npos; }
 
 // Throws Error(usage) for the name of a file that no text of a scene can hold, as it is no UTF-8.
 void require_scene_name(const std::filesystem::path& file);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "scenes/format/named_files.h"
 #include "scenes/format/schema.h"
 #include "scenes/format/text.h"
 
@@ -215,7 +216,7 @@ void read_seed(const Reading& reading, const Node& node, std::uint64_t& seed) {
 void read_path(const Reading& reading, const Node& node, std::optional<std::filesystem::path>& path) {
     if (node.kind != Node::Kind::text) {
         reading.report(node.place, "is " + node_text(node));
-    } else if (node.text.empty() || node.text.find('\0') != std::string::npos) {
+    } else if (names_no_file(node.text)) {
         reading.report(node.place, "names no file");
     } else {
         path = std::filesystem::path(node.text);

@@ -95,7 +95,9 @@ class Reader {
         const std::size_t length = done() ? 1 : word().size();
         constexpr std::size_t kLongestWord = 60, kLongest = 1000;  // far longer than those of reports
         std::string shown = done() ? "" : word();
-        if (shown.size() > kLongestWord) shown = shown.substr(0, kLongestWord) + "...";
+        std::size_t end = kLongestWord;
+        while (end > 0 && end < shown.size() && (shown[end] & 0xC0) == 0x80) --end;  // within a character
+        if (shown.size() > kLongestWord) shown = shown.substr(0, end) + "...";
         const std::string what = (done() ? "the report ends early" : "`" + shown + "`") + ": " + expected;
         if (metar_.text.size() > kLongest) throw Error(ErrorCode::usage, what);
         throw Error(ErrorCode::usage, what + "\n  " + metar_.text + "\n  " + std::string(column, ' ') +

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -155,6 +156,8 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
         } catch (const ReadFailure&) {
             throw;
         } catch (const Error& failure) {
+            // What says nothing of a file, as that a part of the program cannot be loaded, is no fault of the export.
+            if (!std::string_view(failure.what()).starts_with(folder.string())) throw;
             if (bad++ == 0) problem = failure.what();
         }
     }

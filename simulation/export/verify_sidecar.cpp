@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <set>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -154,6 +155,8 @@ std::optional<Check> check_sidecars(const std::filesystem::path& folder, const L
         } catch (const ReadFailure&) {
             throw;
         } catch (const Error& error) {
+            // What says nothing of a file, as that a part of the program cannot be loaded, is no fault of the export.
+            if (!std::string_view(error.what()).starts_with(folder.string())) throw;
             if (bad++ == 0) problem = error.what();
         }
     }

@@ -10,7 +10,7 @@ import struct
 import subprocess
 import unittest
 
-from case import BAD, Case, NEPHOS, SANITIZED, SCENE
+from case import BAD, Case, NEPHOS, SANITIZED, SCENE, limit_addresses, unsealed
 
 
 class Files(Case):
@@ -125,7 +125,7 @@ class Files(Case):
         self.refused(2, "run", self.scene, "--no-render", "--out", "out", says="`seed` was 4, now 3; `k0` was 1, now not there")
         whole["list"] = other["list"]
         whole.update({f"k{n}": [] for n in range(100_000)})
-        (self.folder / "whole/manifest.json").write_text(json.dumps(whole))
+        (self.folder / "whole/manifest.json").write_text(unsealed(whole))
         self.call("verify", "whole")
         self.call("run", self.scene, "--no-render", "--out", "out", "--overwrite")
 
@@ -227,6 +227,12 @@ class Files(Case):
         self.call("run", self.scene, "--no-render", "--out", "out")
 
     @unittest.skipIf(SANITIZED, "its shadow memory would not fit")
+    def test_an_export_is_not_false_where_memory_is_short(self):
+        self.call("run", self.scene, "--no-render", "--out", "run", "-q")
+        self.call("export", "run", "--to", "raw", "-o", "exported", "-q")
+        result = self.call("verify", "exported", status=3, preexec_fn=lambda: limit_addresses(150 << 20))
+        self.assertIn("cannot be loaded", result.stderr)
+
     def test_little_memory_is_an_error_and_no_crash(self):
         big = self.write("big.toml", SCENE.replace("[32, 24, 12]", "[4096, 4096, 512]"))
         def small():

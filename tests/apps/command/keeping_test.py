@@ -120,6 +120,28 @@ class Keeping(Case):
                 self.folder / "small/checkpoint.nephos").exists() else []))
             self.same_runs("whole", "small")
 
+    def test_tables_of_another_run(self):
+        """Brought beside a checkpoint they are not taken for its own: neither when it goes on, nor by a branch."""
+        for name, seed in (("a", 3), ("b", 4)):
+            self.call(*self.plain, "--seed", seed, "--out", name)
+        later = ("--set", "time.steps=9", "--no-render", "-q")
+        shutil.copytree(self.folder / "a", self.folder / "mixed")
+        shutil.copy(self.folder / "b/statistics.csv", self.folder / "mixed")
+        self.kept("mixed", 3, "run", self.scene, "--seed", 3, *later, "--out", "mixed", "--resume",
+                  says="mixed/statistics.csv: step 6 has another state than in manifest.json: the table is of another run")
+        self.kept("mixed", 3, "run", "--from", "mixed", *later, "--out", "no", says="the table is of another run")
+        shutil.copy(self.folder / "a/checkpoint.nephos", self.folder / "b/early.nephos")
+        self.kept("b", 3, "run", self.scene, "--seed", 3, "--from", "b/early.nephos", *later, "--out", "no",
+                  says="b/early.nephos: is not of the run in the folder that it lies in")
+
+    def test_a_frame_that_is_not_what_was_written(self):
+        self.call(*self.plain, "--out", "out")
+        frame = self.folder / "out/density/tiny_0001.vdb"
+        for put in (lambda: frame.write_bytes(b""), lambda: os.mkfifo(frame), lambda: frame.symlink_to("/dev/zero"), frame.mkdir):
+            frame.unlink()
+            put()
+            self.refused(3, *self.plain, "--out", "out", "--resume", "--set", "time.steps=9", says="tiny_0001.vdb: is not the file of ")
+
     def test_a_run_of_another_name_is_replaced_as_a_whole(self):
         self.call(*self.plain, "--out", "out")
         self.call(*self.plain, "--out", "out", "--set", 'name="other"', "--overwrite")

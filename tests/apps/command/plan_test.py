@@ -149,18 +149,24 @@ sd = 0.1
     def test_what_is_wrong_is_said_where_it_stands(self):
         """In the file of the plan, with line and column; of several overrides and values at the one that it is of."""
         ext = '[[axis]]\nkey = "field.background.ext"\n'
+        self.call("state", self.scene, "--steps", "1", "--out", "there.vdb")
+        ellipsoids = "[{ centre_m = [1000, 1000, 500], semi_axes_m = [500, 500, 400], centre = { hum = 0.2, act = 0.01, ext = 0.1 }, rim = { ext = %s } }]"
         for text, says in (
                 (ext + "values = [0.1, 1.5]\n", "6:16: error: `field.background.ext` is 1.5"),
                 (ext + "values = [0.1, 0.2, 0.10]\n", "6:21: error: axis field.background.ext: value 3 is 0.1, and so is value 1"),
                 ('[[axis]]\nkey = "field.background.exd"\nvalues = [0.1]\n', "5:7: error: unknown key"),
                 ('[[axis]]\nkeys = ["field.background.act",\n  "seed"]\nvalues = [0.1]\n', "6:3: error: axis field.background.act+seed: the seed is"),
-                (ext + ext + "values = [0.1]\n", "error: "),
+                (ext + ext + "values = [0.1]\n", "4:1: error: an axis has no values"),
                 (ext + "values = [0.1]\n" + ext + "values = [0.2]\n", "8:7: error: key `field.background.ext` is in two axes"),
                 ('set = ["name=x", "field.background.hum=7"]\n', "4:18: error: `field.background.hum` is 7"),
                 ('set = ["name=x", "field.backgrount.hum=7"]\n', "4:18: error: unknown key"),
                 ('design = "sobol"\npoints = 2\n' + ext + "range = { from = -1.0, to = 0.3 }\n", "8:18: error: `field.background.ext` is -1"),
                 (ext + "range = { from = 0.1, to = 1.5, count = 3 }\n", "6:28: error: `field.background.ext` is 1.5"),
                 (ext + "range = { from = 0.1, to = 0.5 }\n", "6:9: error: axis field.background.ext: has a range without a number"),
+                ('design = "sobol"\npoints = 2\n' + ext + 'range = { from = 0.1, to = 7.3, scale = "log" }\n', "8:28: error: `field.background.ext` is 7.3"),
+                ('[[axis]]\nkey = "field.ellipsoids"\nvalues = [\n' + ellipsoids % "0.5" + ",\n" + ellipsoids % "7.0" + "]\n", "8:1: error: "),
+                ('design = "sobol"\npoints = 8\n[[axis]]\nkey = "lattice.cells[0]"\nrange = { from = 24, to = 64 }\n', "8:9: error: `lattice.cells[0]` is "),
+                ('folder = "a\\u0000b"\n', "4:10: error: `folder` names no folder"),
                 ('layer = "low"\n', "4:9: error: the scene has no layers, and so none named `low`"),
                 ('[[axis]]\nkey = "layer"\nvalues = [[], [{ name = "v", veil = { form = "cirrus" } }]]\n', "6:15: error: ")):
             with self.subTest(text=text):
@@ -172,6 +178,13 @@ sd = 0.1
         plan = self.write("state.toml", 'scene = "tiny.toml"\n[[axis]]\nkey = "lattice.initial_state"\nvalues = ["none.vdb"]\n')
         said = self.call("sweep", plan, "--out", "no", status=3).stderr
         self.assertIn("state.toml:4:11: error: ", said)
+        plan = self.write("set.toml", 'scene = "tiny.toml"\nset = ["name=x",\n  "lattice.initial_state=no.vdb"]\n')
+        self.assertIn("set.toml:3:3: error: ", self.call("sweep", plan, "--out", "no", status=3).stderr)
+        long = "d" * 110  # as names in deep folders begin alike
+        self.call("state", self.scene, "--steps", "2", "--out", f"{long}/a.vdb")
+        plan = self.write("long.toml", f'scene = "tiny.toml"\n[[axis]]\nkey = "lattice.initial_state"\nvalues = ["there.vdb",\n "{long}/a.vdb",\n'
+                                       f' "{long}/b.vdb"]\n')
+        self.assertIn("long.toml:6:2: error: ", self.call("sweep", plan, "--out", "no", status=3).stderr)
         # What was given beside it has no place there.
         self.plan(ext + "values = [0.1]\n")
         for arguments, says in ((("--axis", "field.background.act=2"), "--set field.background.act=2: error: "),
@@ -187,11 +200,15 @@ sd = 0.1
                 self.call("state", self.scene, "--steps", "1", "--set", f"field.background.hum={hum}", "--out", f"{name}.vdb")
             (self.folder / f"{name}.vdb").rename(self.folder / name)
         self.call("state", self.scene, "--steps", "1", "--out", "c.vdb")
-        for axis, names in (("007", ["007"]), ("c.vdb,007", ["c.vdb", "007"]), ('c.vdb,"a..b.vdb"', ["c.vdb", "a..b.vdb"]), ("7", ["7"])):
+        for axis, names in (("007", ["007"]), ("c.vdb,007", ["c.vdb", "007"]), ('c.vdb,"a..b.vdb"', ["c.vdb", "a..b.vdb"]), ("7", ["7"]), ("'7'", ["7"])):
             with self.subTest(axis=axis):
                 self.call("sweep", self.scene, "--axis", f"lattice.initial_state={axis}", "--replicates", "1", "--steps", "20", "--out", "files")
                 self.assertEqual([run["lattice.initial_state"] for run in rows(self.folder / "files/runs.csv")],
                                  [str(self.folder / name) for name in names])
+        said = self.call("sweep", self.scene, "--axis", "lattice.initial_state=7,'7'", "--out", "no", status=2).stderr
+        self.assertIn("and so is value 1", said)
+        # The end of a range is the number that was given.
+        self.call("sweep", self.null, "--axis", "density.extinction_per_m=log:0.3..100", "--points", "4", "--dry-run")
         # A number stays one, however it is written.
         said = self.call("sweep", self.null, "--axis", "lattice.cells[0]=0x10,1_6", "--out", "no", status=2).stderr
         self.assertIn("value 2 is 16, and so is value 1", said)

@@ -33,6 +33,21 @@ class Records(Case):
         content[at] ^= 0x10
         path.write_bytes(content)
 
+    def test_a_shard_that_is_being_written_is_not_damaged(self):
+        """Its series grow before its records do: whoever reads them meanwhile finds both whole."""
+        tiny = self.write("smallest.toml", NULL.replace("[64, 64, 10]", "[4, 4, 4]"))
+        study = ("sweep", tiny, "--axis", "field.background.ext=0.05,0.1,0.2,0.3", "--replicates", "1500", "--steps", "20..20", "--clouds-every",
+                 "0", "-j", "1", "--quiet", "--out", "parts", "--shard")
+        writer = subprocess.Popen([NEPHOS, *study, "0/2"], cwd=self.folder, env=self.environment)
+        while not (self.folder / "parts/shards/0000-of-0002.series").exists():
+            time.sleep(0.01)
+        looks = 0
+        while writer.poll() is None:
+            self.call(*study, "1/2", "--status")
+            looks += 1
+        self.assertEqual(writer.returncode, 0)
+        self.assertGreater(looks, 1)
+
     def test_a_flipped_bit_of_series_is_named_and_costs_one_run(self):
         self.sweep("whole")
         before = self.tables("whole")
