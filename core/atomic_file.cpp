@@ -107,9 +107,25 @@ class PieceWriter {
 
 }  // namespace
 
+namespace {
+
+thread_local const std::function<void()>* publish_check = nullptr;
+
+void check_before_publishing() {
+    if (publish_check != nullptr && *publish_check) (*publish_check)();
+}
+
+}  // namespace
+
+PublishCheck::PublishCheck(const std::function<void()>& check) : before_(publish_check) {
+    publish_check = &check;
+}
+PublishCheck::~PublishCheck() { publish_check = before_; }
+
 AtomicFile::AtomicFile(const std::filesystem::path& given, Access access, Folders folders)
     : path_(target_of(given)) {
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
+    check_before_publishing();
     if (folders == Folders::made) create_folders(folder);
     create_temporary(folder, access);
 }
@@ -194,6 +210,7 @@ void AtomicFile::publish() {
             ::fchmod(descriptor.get(), *permissions_) != 0)
             fail(path_, "cannot set its permissions", errno);
     }
+    check_before_publishing();
     std::error_code error;
     std::filesystem::rename(temporary_, path_, error);
     if (error) fail(path_, "cannot rename into place", error.value());

@@ -62,6 +62,21 @@ class AtomicFile {
     bool published_ = false;
 };
 
+// While one lives, AtomicFile calls `check` in this thread right before it creates a temporary file and right before it renames
+// one into place: what `check` throws keeps it from that. Of use where the writers in between, of libraries and formats, know
+// nothing of the folder's owner, who may move it away while they work. Each library that
+// is loaded by itself has its own.
+class PublishCheck {
+  public:
+    explicit PublishCheck(const std::function<void()>& check);
+    ~PublishCheck();
+    PublishCheck(const PublishCheck&) = delete;
+    PublishCheck& operator=(const PublishCheck&) = delete;
+
+  private:
+    const std::function<void()>* before_;
+};
+
 // Calls `write` with the path of an empty temporary file, which `write` must open, fill and close; then publishes it.
 // Throws as AtomicFile; exceptions of `write` pass through. Every failure removes the temporary file.
 void write_atomically(const std::filesystem::path& path,

@@ -41,6 +41,9 @@ class FrameOutput {
     // Error(gpu) when pictures are wanted and the device that is asked for is not there.
     FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&, std::vector<WrittenFile>)> done);
 
+    // Calls `guard` before each file of a frame, by the thread that writes. Before the first add().
+    void set_guard(std::function<void()> guard) { writer_.set_guard(std::move(guard)); }
+
     // Return what Renderer's do; empty without pictures.
     std::string backend_name() const;
     std::string device_name() const;

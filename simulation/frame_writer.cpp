@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/atomic_file.h"
 #include "core/random.h"
 #include "density/combine.h"
 #include "density/metaballs.h"
@@ -105,6 +106,7 @@ WrittenFile FrameWriter::write(const FrameResult& frame, VdbContent content, std
     const StateHash& hash = layer ? frame.layers[*layer].hash : frame.hash;
     const std::filesystem::path path =
         layer ? folder_.density(frame.number, frame.layers[*layer].name) : folder_.density(frame.number);
+    content.publish_check = guard_;
     write_vdb(path, content, metadata_of(frame, hash, layer, density));
     return {path, file_digest(path), voxel_digest(density, content.half)};
 }
@@ -164,6 +166,7 @@ Rgb8Image FrameWriter::write_picture(const FrameResult& frame, const Picture& pi
     metadata.time_scale = scene_.frames.time_scale;
     metadata.extinction_per_m = scene_.density.extinction_per_m;
     const RenderOptions options = exposed_options(frame, picture, painter.camera(frame.time_s));
+    const PublishCheck check(guard_);
     if (scene_.frames.exr) write_exr(folder_.picture(frame.number, ".exr"), picture, options, metadata);
     if (!wants_png(scene_)) return {};
     Rgb8Image image = srgb8_image(picture, options);

@@ -4,7 +4,9 @@
 // Writes the files of a scene's frames into the folder of a run, under the names of RunFolder. Every file is
 // either complete or not there.
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/digest.h"
@@ -41,6 +43,9 @@ class FrameWriter {
     // of the frame before the first that is written, as after --resume, is read from its PNG file.
     Rgb8Image write_picture(const FrameResult& frame, const Picture& picture, const FramePainter& painter);
 
+    // Calls `guard` before each file: it throws where none may be written any more.
+    void set_guard(std::function<void()> guard) { guard_ = std::move(guard); }
+
   private:
     std::vector<WrittenFile> write_layers(const FrameResult& frame) const;
     WrittenFile write(const FrameResult& frame, VdbContent content, std::optional<std::size_t> layer) const;
@@ -54,6 +59,7 @@ class FrameWriter {
     RenderOptions exposed_options(const FrameResult& frame, const Picture& picture, const Camera& camera);
 
     std::string frames_hash_;
+    std::function<void()> guard_;
     int first_frame_ = 1;
     int exposed_frame_ = 0;   // the last whose exposure is known; 0: none
     double exposed_ev_ = 0;  // of that frame, stops

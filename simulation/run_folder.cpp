@@ -2,27 +2,22 @@
 #include "simulation/run_folder.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <exception>
+#include <memory>
 #include <system_error>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "automaton/checkpoint.h"
 #include "core/error.h"
-#include "core/paths.h"
-#include "density/vdb/vdb_file.h"
-#include "density/voxel_digest.h"
 #include "render/image/video.h"
 #include "scenes/format/writer.h"
 #include "simulation/branch.h"
 #include "simulation/earlier_run.h"
 #include "simulation/folder_lock.h"
-#include "simulation/frame_output.h"
 #include "simulation/manifest.h"
 #include "simulation/run_inputs.h"
+#include "simulation/run_recorder.h"
 #include "simulation/scene_files.h"
 #include "simulation/statistics_file.h"
 
@@ -37,241 +32,6 @@ double seconds_between(Clock::time_point begin, Clock::time_point end) {
     return std::chrono::duration<double>(end - begin).count();
 }
 double seconds_since(Clock::time_point begin) { return seconds_between(begin, Clock::now()); }
-
-// Turns results into files: statistics and manifest here, those of frames beside the simulation.
-class Recorder : public SimulationSink {
-  public:
-    explicit Recorder(const RunSettings& settings)
-        : settings_(settings),
-          folder_{settings.folder, settings.scene.name},
-          output_(settings, [this](const FrameResult& frame, std::vector<WrittenFile> files) {
-              note(frame, std::move(files));
-          }) {
-        state_.backend = output_.backend_name();
-        state_.device = output_.device_name();
-    }
-
-    void step(const StepResult& result) override {
-        output_.check();
-        statistics_->add(statistics_row(result));
-        for (std::size_t n = 0; n < result.layers.size(); ++n) {
-            layer_statistics_[n].add(statistics_row(result, result.layers[n]));
-        }
-        state_.state_hash = result.hash.hex();
-        state_.steps_reported = result.step + 1;
-    }
-
-    void frame(const FrameResult& result) override { output_.add(result); }
-
-    // The files that the scene names, for the manifest.
-    void set_inputs(std::vector<RunInput> inputs) { state_.inputs = std::move(inputs); }
-
-    // Frames whose files are all there.
-    int frames_done() const { return frames_done_; }
-
-    // The files of a run that begins. A folder that cannot be written to is found now.
-    void begin() {
-        write_manifest(false, 0);
-        statistics_ = StatisticsFile::create(folder_.statistics());
-        if (!settings_.scene.layers.empty()) create_folders(folder_.folder / "statistics");
-        for (const LayerOptions& layer : settings_.scene.layers) {
-            layer_statistics_.push_back(
-                StatisticsFile::create(folder_.statistics(layer.name), kLayerStatisticsHeader));
-        }
-    }
-
-    // Goes on from the statistics of the run that this one branches off, with frames of its own. The manifest is there before
-    // the first of them: without it they would be nobody's, should this fail.
-    void begin_branch(const Simulation& simulation) {
-        require_tables_of_other_run(settings_, simulation.next_step());
-        remove_earlier_run(folder_);
-        write_manifest(false, 0);
-        copy_tables_of_other_run(settings_, folder_, simulation.next_step());
-        statistics_ = StatisticsFile::resume(
-            folder_.statistics(), simulation.next_step(),
-            [this](std::uint64_t, std::string_view, const StateHash& hash) { state_.state_hash = hash.hex(); });
-        for (const LayerOptions& layer : settings_.scene.layers)
-            layer_statistics_.push_back(StatisticsFile::resume(folder_.statistics(layer.name), simulation.next_step(),
-                                                               {}, kLayerStatisticsHeader));
-        state_.steps_reported = simulation.next_step();
-        write_manifest(false, 0);
-    }
-
-    // Takes over what an earlier run reported up to where `simulation` goes on, and checks that it is all
-    // there.
-    void take_over(const Simulation& simulation) {
-        int number = settings_.range.first_frame;
-        const auto record_frames_of = [&](std::uint64_t step, std::string_view, const StateHash& hash) {
-            state_.state_hash = hash.hex();
-            for (; number < simulation.next_frame(); ++number) {
-                if (moment_of_frame(settings_.scene, number - 1).step != step) return;
-                const double time_s = frame_time_s(settings_.scene.frames, number - 1);
-                state_.frames.push_back({number, time_s, step, hash, {}});
-            }
-        };
-        const EarlierRun earlier = read_manifest(folder_.manifest());
-        require_table_of_run(folder_.statistics(), earlier.steps_reported, earlier.state_hash, kStartAnew);
-        // Frames before the first row of their step cannot be: a range of frames reports every step from 0.
-        statistics_ = StatisticsFile::resume(folder_.statistics(), simulation.next_step(), record_frames_of);
-        frames_done_ = int(state_.frames.size());
-        for (const LayerOptions& layer : settings_.scene.layers) {
-            layer_statistics_.push_back(StatisticsFile::resume(
-                folder_.statistics(layer.name), simulation.next_step(), {}, kLayerStatisticsHeader));
-        }
-        if (!settings_.scene.layers.empty()) state_.rain = read_rain(folder_.manifest());
-        std::erase_if(state_.rain, [&](const auto& rain) { return rain.first >= simulation.next_frame(); });
-        state_.steps_reported = simulation.next_step();
-        require_frames("is missing, although the checkpoint is past it");
-        std::map<int, std::vector<FileRecord>> files = read_frame_files(folder_.manifest());
-        for (FrameRecord& frame : state_.frames) {
-            frame.files = std::move(files[frame.number]);
-            if (frame.files.empty()) frame.files = digests_of_frame(frame.number);
-            for (const FileRecord& file : frame.files) require_size(file);
-        }
-    }
-
-    // Throws Error(io) when something else has taken the place of a file, or a part of it.
-    void require_size(const FileRecord& file) const {
-        const std::filesystem::path path = folder_.folder / file.path;
-        std::error_code error;
-        const bool is_file = std::filesystem::is_regular_file(path, error);
-        if (!error && is_file && std::filesystem::file_size(path, error) == file.digest.bytes) return;
-        throw Error(
-            ErrorCode::io,
-            fmt::format("{}: is not the file of {} bytes that was written: start anew with --overwrite",
-                        path.string(), file.digest.bytes));
-    }
-
-    // Throws Error(io) when a file of a frame that is done is not there.
-    void require_frames(const std::string& what) const {
-        for (const RunFiles& files : frame_files()) {
-            for (const std::filesystem::path& file : files.files) {
-                std::error_code error;
-                const auto type = std::filesystem::status(file, error).type();
-                if (type == std::filesystem::file_type::none)
-                    throw Error(ErrorCode::io, file.string() + ": cannot examine: " + error.message());
-                if (type != std::filesystem::file_type::not_found) continue;
-                throw Error(ErrorCode::io, file.string() + ": " + what + ": start anew with --overwrite");
-            }
-        }
-    }
-
-    // Frames and statistics first: what the checkpoint goes on from is then always there. So are the manifest's rain
-    // and digests, which no other file has.
-    void save(Simulation& simulation, double wall_s, bool with_checkpoint = true) {
-        output_.finish();
-        statistics_->save();
-        for (StatisticsFile& file : layer_statistics_) file.save();
-        write_manifest(false, wall_s);
-        if (with_checkpoint) write_checkpoint(folder_.checkpoint(), simulation.save());
-    }
-
-    // After a failure: lists every frame that is there, beside the steps of the last save(). A manifest that
-    // cannot be written either is no news, and the old one is still right.
-    void list_finished_frames(double wall_s) noexcept {
-        output_.finish_quietly();
-        try {
-            ManifestState state = state_;
-            state.steps_reported = steps_saved_;
-            state.state_hash = hash_saved_;
-            state.wall_s = wall_s;
-            nephos::write_manifest(settings_, state);
-        } catch (const std::exception&) {
-        }
-    }
-
-    void write_manifest(bool complete, double wall_s) {
-        state_.complete = complete;
-        state_.run_files.clear();
-        if (complete) {
-            for (const std::filesystem::path& path : run_files())
-                state_.run_files.push_back({relative(path), file_digest(path), {}});
-        }
-        state_.wall_s = wall_s;
-        nephos::write_manifest(settings_, state_);
-        steps_saved_ = state_.steps_reported;
-        hash_saved_ = state_.state_hash;
-    }
-
-    // The files are as they should be, and stay.
-    void leave_complete() { state_.complete = true; }
-
-    // The video of all frames, unless it is there already. One of a shorter run is made anew.
-    void start_video(const Simulation& simulation) {
-        if (!settings_.render || !wants_video(settings_.scene)) return;
-        std::error_code error;
-        if (simulation.next_frame() <= settings_.range.last_frame &&
-            !std::filesystem::remove(folder_.video(), error) && error)
-            throw Error(ErrorCode::io, folder_.video().string() + ": cannot remove: " + error.message());
-        if (!std::filesystem::exists(folder_.video())) output_.start_video();
-    }
-    bool makes_video() const { return output_.makes_video(); }
-    void finish_video() { output_.finish_video(); }
-
-    std::vector<RunFiles> frame_files() const {
-        RunFiles density{"density", {}}, png{"png", {}}, exr{"exr", {}};
-        for (const FrameRecord& frame : state_.frames) {
-            for (std::filesystem::path& file : density_files(folder_, settings_.scene, frame.number))
-                density.files.push_back(std::move(file));
-            if (!settings_.render) continue;
-            for (std::filesystem::path& file : picture_files(folder_, settings_.scene, frame.number))
-                (file.extension() == ".png" ? png : exr).files.push_back(std::move(file));
-        }
-        std::vector<RunFiles> all{std::move(density), std::move(png), std::move(exr)};
-        std::erase_if(all, [](const RunFiles& files) { return files.files.empty(); });
-        return all;
-    }
-
-    const ManifestState& state() const { return state_; }
-    const RunFolder& folder() const { return folder_; }
-
-  private:
-    std::string relative(const std::filesystem::path& path) const {
-        return path.lexically_relative(settings_.folder).generic_string();
-    }
-
-    // Of the files that belong to no frame, all but the manifest.
-    std::vector<std::filesystem::path> run_files() const {
-        std::vector<std::filesystem::path> files{folder_.statistics()};
-        for (const LayerOptions& layer : settings_.scene.layers)
-            files.push_back(folder_.statistics(layer.name));
-        if (settings_.checkpoint) files.push_back(folder_.checkpoint());
-        if (settings_.render && wants_video(settings_.scene)) files.push_back(folder_.video());
-        return files;
-    }
-
-    // For frames of a run whose manifest, of an earlier version, names no digests.
-    std::vector<FileRecord> digests_of_frame(int number) const {
-        std::vector<FileRecord> files;
-        for (const std::filesystem::path& path : density_files(folder_, settings_.scene, number))
-            files.push_back({relative(path), file_digest(path), voxel_digest(read_density(path))});
-        if (!settings_.render) return files;
-        for (const std::filesystem::path& path : picture_files(folder_, settings_.scene, number))
-            files.push_back({relative(path), file_digest(path), {}});
-        return files;
-    }
-
-    // By the thread that writes.
-    void note(const FrameResult& frame, std::vector<WrittenFile> written) {
-        std::vector<FileRecord> files;
-        for (WrittenFile& file : written)
-            files.push_back({relative(file.path), std::move(file.digest), std::move(file.voxels)});
-        state_.frames.push_back({frame.number, frame.time_s, frame.step, frame.hash, std::move(files)});
-        if (std::vector<RainRecord> rain = rain_of(frame); !rain.empty())
-            state_.rain[frame.number] = std::move(rain);
-        frames_done_ = int(state_.frames.size());
-    }
-
-    const RunSettings& settings_;
-    RunFolder folder_;
-    std::optional<StatisticsFile> statistics_;  // from begin() or take_over() on
-    std::vector<StatisticsFile> layer_statistics_;
-    ManifestState state_;  // while frames are under way, `frames` and `rain` belong to the thread that writes
-    std::atomic<int> frames_done_ = 0;
-    std::uint64_t steps_saved_ = 0;  // as the manifest names them
-    std::string hash_saved_;
-    FrameOutput output_;  // last: ends first
-};
 
 // Returns what a report says of the settings alone.
 RunReport report_head(const RunSettings& settings) {
@@ -290,7 +50,7 @@ RunFiles statistics_files(const RunSettings& settings, const RunFolder& folder) 
     return statistics;
 }
 
-RunReport report_of(const Recorder& recorder, const RunSettings& settings, const Simulation& simulation) {
+RunReport report_of(const RunRecorder& recorder, const RunSettings& settings, const Simulation& simulation) {
     const ManifestState& state = recorder.state();
     RunReport report = report_head(settings);
     report.complete = state.complete;
@@ -314,7 +74,7 @@ RunReport report_of(const Recorder& recorder, const RunSettings& settings, const
 
 bool stopped(const RunObserver& observer) { return observer.stop && observer.stop(); }
 
-void report_progress(const RunObserver& observer, const Simulation& simulation, const Recorder& recorder,
+void report_progress(const RunObserver& observer, const Simulation& simulation, const RunRecorder& recorder,
                      const RunSettings& settings, std::string_view phase) {
     if (!observer.progress) return;
     observer.progress({simulation.steps_taken(), simulation.steps_in_all(), recorder.frames_done(),
@@ -322,7 +82,7 @@ void report_progress(const RunObserver& observer, const Simulation& simulation, 
 }
 
 // Up to the end or until it is stopped; leaves a checkpoint, at the end only where one is wanted.
-void simulate(Simulation& simulation, Recorder& recorder, const RunSettings& settings,
+void simulate(Simulation& simulation, RunRecorder& recorder, const RunSettings& settings,
               const RunObserver& observer, const FolderLock& lock, Clock::time_point begin) {
     Clock::time_point saved = Clock::now(), looked = saved;
     lock.require_in_place();
@@ -349,6 +109,8 @@ void simulate(Simulation& simulation, Recorder& recorder, const RunSettings& set
 RunReport report_of_complete(const RunSettings& settings, const RunFolder& folder) {
     RunReport report = report_head(settings);
     report.complete = report.skipped = true;
+    const EarlierRun earlier = read_manifest(folder.manifest());
+    require_table_of_run(folder.statistics(), earlier.steps_reported, earlier.state_hash, kStartAnew);
     report.first_step = report.steps_taken = settings.range.last_step;
     report.steps_reported = settings.range.last_step + 1;
     read_statistics(
@@ -360,7 +122,7 @@ RunReport report_of_complete(const RunSettings& settings, const RunFolder& folde
 }
 
 // Completes the video, when there is to be one and it is not there yet; false when it was stopped.
-bool encode(const Simulation& simulation, Recorder& recorder, const RunSettings& settings,
+bool encode(const Simulation& simulation, RunRecorder& recorder, const RunSettings& settings,
             const RunObserver& observer) {
     if (!recorder.makes_video()) return true;
     report_progress(observer, simulation, recorder, settings, "encoding");
@@ -454,9 +216,10 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     };
     if (found() == Resumption::complete) return report_of_complete(settings, folder);
     std::optional<Simulation> made;  // outlives the recorder, whose threads draw what is in it
-    Recorder recorder(settings);     // opens the device
+    RunRecorder recorder(settings);  // opens the device
 
-    const FolderLock lock(folder.folder, "run");
+    const auto lock = std::make_shared<const FolderLock>(folder.folder, "run");
+    recorder.set_guard([lock] { lock->require_in_place(); });
     const Resumption resumption = found();  // once more: another run may have been at work until now
     if (resumption == Resumption::complete) return report_of_complete(settings, folder);
     settings.resume = resumption == Resumption::go_on;
@@ -465,7 +228,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         refuse_to_remove_inputs(folder, inputs);
         if (!settings.overwrite) refuse_to_lose(folder, settings, inputs, resumption);
     }
-    if (lock.held()) remove_leftovers(folder);
+    if (lock->held()) remove_leftovers(folder);
     Simulation& simulation =
         made.emplace(settings.resume   ? resumed_simulation(settings, folder, inputs)
                      : settings.branch ? branched_simulation(settings, folder)
@@ -498,16 +261,16 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     }
 
     try {
-        simulate(simulation, recorder, settings, observer, lock, begin);
+        simulate(simulation, recorder, settings, observer, *lock, begin);
     } catch (...) {
         // What failed in a folder that is gone failed for that; and in a new one of its name another run may be at work.
-        lock.require_in_place();
+        lock->require_in_place();
         recorder.list_finished_frames(seconds_since(begin));
         throw;
     }
     const bool complete = simulation.finished() && encode(simulation, recorder, settings, observer);
     if (complete) {
-        lock.require_in_place();
+        lock->require_in_place();
         recorder.require_frames("was removed while the run was writing");
         recorder.write_manifest(true, seconds_since(begin));
         if (!settings.checkpoint) remove_checkpoint(folder);

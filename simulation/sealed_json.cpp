@@ -15,6 +15,15 @@ constexpr std::size_t kDigits = 32;
 
 std::string seal_text(const std::string& digits) { return fmt::format("{}{}{}", kBefore, digits, kAfter); }
 
+// Returns the last character of a JSON object before the brace that closes it; 0 for other texts.
+char last_of(std::string_view text) {
+    constexpr std::string_view kWhite = " \t\r\n";
+    const std::size_t brace = text.find_last_not_of(kWhite);
+    if (brace == text.npos) return 0;
+    const std::size_t last = text.substr(0, brace).find_last_not_of(kWhite);
+    return last == text.npos ? '\0' : text[last];
+}
+
 }  // namespace
 
 std::string seal_text(const Digest& before) { return seal_text(before.hex()); }
@@ -28,8 +37,10 @@ std::string sealed_text(std::string_view object) {
 
 Seal seal_of(const std::filesystem::path& list) {
     const std::string text = read_json_text(list);
+    // The last member of lists of earlier versions is an object or a list, which a text with one byte changed does not become.
     const nlohmann::ordered_json json = parsed_json_text(text, JsonLists::left_out);
-    if (json.is_object() && !json.contains(kSealKey)) return Seal::none;
+    const char last = last_of(text);
+    if (json.is_object() && !json.contains(kSealKey) && (last == '}' || last == ']')) return Seal::none;
     constexpr std::size_t kSize = kBefore.size() + kDigits + kAfter.size();
     if (text.size() < kSize) return Seal::broken;
     const std::string_view before = std::string_view(text).substr(0, text.size() - kSize);

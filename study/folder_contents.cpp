@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/folder_contents.h"
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -69,6 +70,14 @@ bool is_series_of_sweep(const fs::path& file) {
     return head.starts_with("CDF") && head.find(kSweepTitle) != head.npos;
 }
 
+// Returns whether something stands there that is not ours. Another process may put a file of ours there, as a whole, or take one
+// away, between two looks.
+bool is_foreign(const fs::path& file, const std::function<bool()>& is_ours) {
+    for (int look = 0; look < 2; ++look)
+        if (!stands_there(file) || is_ours()) return false;
+    return true;
+}
+
 }  // namespace
 
 void require_absent(const fs::path& file, std::string_view by) {
@@ -80,13 +89,14 @@ void require_absent(const fs::path& file, std::string_view by) {
 }
 
 void require_own(const fs::path& file, std::string_view beginning, std::string_view by) {
-    if (!begins_with(file, beginning)) require_absent(file, by);
+    if (is_foreign(file, [&] { return begins_with(file, beginning); })) require_absent(file, by);
 }
 
 void require_sweep_folder(const fs::path& folder) {
     for (const auto& [name, beginning] : kTables)
         if (!is_unmarked(folder, name)) require_own(folder / name, beginning, kSweep);
-    if (!is_series_of_sweep(folder / "series.nc")) require_absent(folder / "series.nc", kSweep);
+    const fs::path series = folder / "series.nc";
+    if (is_foreign(series, [&] { return is_series_of_sweep(series); })) require_absent(series, kSweep);
     // Leaves links and pipes to open_regular_file(), which refuses them with the reason; a killed sweep leaves it empty.
     const fs::path timing = folder / "timing.csv";
     std::error_code error;

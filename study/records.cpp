@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <span>
+#include <tuple>
 
 #include "study/folder_contents.h"
 #include "study/packed_series.h"
@@ -18,6 +19,7 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/file_stamp.h"
 #include "core/paths.h"
 #include "core/random.h"
 #include "core/text.h"
@@ -92,10 +94,12 @@ struct PlacedRecord {
 // Returns those whose packed series are not as they were written, in the order of the file of series, which is read once and
 // forwards. Throws ReadFailure. Precondition: the file holds the bytes that the records name.
 std::vector<const PlacedRecord*> with_damaged_series(const std::vector<PlacedRecord>& records,
-                                                     const std::filesystem::path& path) {
+                                                     const std::filesystem::path& path,
+                                                     const CheckedRuns& checked) {
     std::vector<const PlacedRecord*> order, damaged;
     for (const PlacedRecord& one : records)
-        if (one.is_sound && !one.record.series_xxh3.empty()) order.push_back(&one);
+        if (one.is_sound && !one.record.series_xxh3.empty() && (!checked || checked(one.record.id)))
+            order.push_back(&one);
     if (order.empty()) return damaged;
     std::ranges::sort(order, {}, [](const PlacedRecord* one) { return one->record.series_offset; });
     std::ifstream stream = open_stream(path);
@@ -117,7 +121,8 @@ std::vector<const PlacedRecord*> with_damaged_series(const std::vector<PlacedRec
 }  // namespace
 
 std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesystem::path& path, RecordsFor use,
-                                                            SeriesCheck check) {
+                                                            const CheckedRuns& checked) {
+    const FileStamp begun = file_stamp(path);
     std::ifstream stream = open_stream(path);
     const auto shard = std::uint32_t(files_.size());
     files_.push_back({std::filesystem::path(path).replace_extension(".series"), folders_ - 1});
@@ -169,14 +174,18 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
             note(one.at, fmt::format("names {} bytes of {}, which has fewer: {}", end,
                                      series_path.filename().string(), stored));
     }
-    const std::vector<const PlacedRecord*> damaged = check == SeriesCheck::all
-                                                         ? with_damaged_series(found, series_path)
-                                                         : std::vector<const PlacedRecord*>{};
-    for (const PlacedRecord* one : damaged) {
+    for (const PlacedRecord* one : with_damaged_series(found, series_path, checked)) {
         note(one->at,
              fmt::format("is of run {}, whose packed series are damaged, at byte {} of {}", one->record.id,
                          one->record.series_offset, series_path.filename().string()));
         found[std::size_t(one - found.data())].is_sound = false;
+    }
+    const FileStamp now = file_stamp(path);
+    if (!problem.empty() && std::tie(now.device, now.inode) != std::tie(begun.device, begun.inode)) {
+        // Begun again with --overwrite meanwhile: the series are those of the new one.
+        files_.pop_back();
+        return now == FileStamp{} ? std::pair<std::uint64_t, std::uint64_t>{}
+                                  : read_shard(path, use, checked);
     }
     for (PlacedRecord& one : found)
         if (one.is_sound) take(std::move(one.record));
@@ -194,7 +203,8 @@ void Records::take(RunRecord record) {
     }
 }
 
-Records Records::read(const std::vector<std::filesystem::path>& folders, RecordsFor use, SeriesCheck check) {
+Records Records::read(const std::vector<std::filesystem::path>& folders, RecordsFor use,
+                      const CheckedRuns& checked) {
     Records records;
     for (const std::filesystem::path& folder : folders) {
         ++records.folders_;
@@ -207,7 +217,7 @@ Records Records::read(const std::vector<std::filesystem::path>& folders, Records
         }
         for (const std::filesystem::path& file : files) {
             try {
-                records.read_shard(file, use, check);
+                records.read_shard(file, use, checked);
             } catch (const ReadFailure& problem) {
                 // All runs of it would be done once more, though nothing is wrong with it.
                 if (use == RecordsFor::running) throw;
@@ -283,7 +293,7 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
     if (separate_from_links(series_path_)) files_->series = open_regular_file(series_path_, kOwn);
     Records records;
     records.folders_ = 1;
-    const auto [bytes, series] = records.read_shard(path_, RecordsFor::running, SeriesCheck::all);
+    const auto [bytes, series] = records.read_shard(path_, RecordsFor::running, {});
     if (!records.problems().empty())
         throw Error(ErrorCode::io,
                     records.problems().front() + "; --overwrite computes the runs of this shard again");

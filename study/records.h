@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -45,8 +46,9 @@ enum class RecordsFor {
     showing,  // by one that writes no records
 };
 
-// Which packed series are compared with their hashes: it takes a pass over all of them.
-enum class SeriesCheck { all, none };
+// Selects the records whose packed series are compared with their hashes, by their run's id; empty: all. It takes a pass over
+// these series.
+using CheckedRuns = std::function<bool(const std::string& id)>;
 
 // All records of some shards, the last of each run; failed ones where there is no other.
 class Records {
@@ -54,7 +56,7 @@ class Records {
     // Reads every shard of the folders. What cannot be read, or is damaged, is left out, and stands in problems(). Throws
     // Error(usage) when records are of another version of the statistics or of the random stream: which, and what helps.
     static Records read(const std::vector<std::filesystem::path>& folders,
-                        RecordsFor use = RecordsFor::running, SeriesCheck check = SeriesCheck::all);
+                        RecordsFor use = RecordsFor::running, const CheckedRuns& checked = {});
 
     // "PATH: what is wrong", one a file; the torn last record of a shard is no problem. A run whose packed series are not as
     // they were written is left out.
@@ -77,7 +79,7 @@ class Records {
     // Reads a shard, and gives back the bytes of its records and those of the series that they refer to. Throws Error(io)
     // when it cannot be opened.
     std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path, RecordsFor use,
-                                                       SeriesCheck check);
+                                                       const CheckedRuns& checked);
 
     // Keeps the last record of a run, but none of a failure where there is another.
     void take(RunRecord record);

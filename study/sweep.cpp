@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <chrono>
 #include <cstring>
 #include <optional>
@@ -67,8 +68,10 @@ int add_timing(const Descriptor& file, const SweepJob& job, int workers, std::ui
 }
 
 // By the value of the id: neither the order of runs nor a grown axis moves a run to another shard.
-bool is_of_shard(const PlannedRun& run, const SweepJob& job) {
-    return job.shards == 1 || std::stoull(run.id.substr(0, 8), nullptr, 16) % job.shards == job.shard;
+bool is_of_shard(const std::string& id, const SweepJob& job) {
+    std::uint32_t number = 0;
+    std::from_chars(id.data(), id.data() + std::min<std::size_t>(id.size(), 8), number, 16);
+    return job.shards == 1 || number % job.shards == job.shard;
 }
 
 std::string packed(const RunResult& result) {
@@ -158,7 +161,7 @@ SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records&
         const PlannedRun run = plan.run(n);
         const RunRecord* record = records.find(run.id);
         known += record != nullptr;
-        if (!is_of_shard(run, job)) continue;
+        if (!is_of_shard(run.id, job)) continue;
         ++report.progress.in_all;
         if (record == nullptr) continue;
         ++report.progress.done;
@@ -217,7 +220,8 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<bool()>& stop) {
     const Clock::time_point begin = Clock::now();
     require_sweep_folder(job.folder);
-    if (!is_there(job.folder)) require_memory_for_runs(plan, job, status_of(plan, job, Records()).progress);
+    if (!is_there(job.folder / "shards"))
+        require_memory_for_runs(plan, job, status_of(plan, job, Records()).progress);
     std::optional<FolderGuard> guard(std::in_place, job.folder, stop);
     if (!guard->is_held()) {  // stopped while another process had the folder
         SweepReport report = status_of(plan, job, Records::read({job.folder}));
@@ -226,13 +230,13 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
     }
     require_place_for(plan, *guard, job.folder);
     // Whoever overwrites does not ask what other shards have done: they may be of another version. Of many shards each compares
-    // its own series, when it is opened.
-    const SeriesCheck check = job.shards == 1 ? SeriesCheck::all : SeriesCheck::none;
-    Records records = job.overwrite ? Records() : Records::read({job.folder}, RecordsFor::running, check);
+    // the series of its own runs, in whichever file they are.
+    const auto is_own = [&](const std::string& id) { return is_of_shard(id, job); };
+    Records records = job.overwrite ? Records() : Records::read({job.folder}, RecordsFor::running, is_own);
     SweepReport report = status_of(plan, job, records);
     SweepProgress& count = report.progress;
     const auto is_wanted = [&](const PlannedRun& run) {
-        if (!is_of_shard(run, job)) return false;
+        if (!is_of_shard(run.id, job)) return false;
         const RunRecord* record = records.find(run.id);
         return record == nullptr || (record->failed && job.retry_failed);
     };

@@ -34,6 +34,17 @@ bool is_empty_file(const std::filesystem::path& path) {
            !error;
 }
 
+// Throws Error(usage) for a file of the sweep itself, of which some are empty for a while.
+void require_none_of_sweep(const std::filesystem::path& folder, const std::filesystem::path& out) {
+    std::vector<std::filesystem::path> files{folder / "timing.csv"};
+    std::error_code error;
+    for (std::filesystem::directory_iterator at(folder / "shards", error), end; !error && at != end;
+         at.increment(error))
+        files.push_back(at->path());
+    for (const std::filesystem::path& file : files)
+        if (std::filesystem::equivalent(file, out, error)) require_absent(out, "`nephos report`");
+}
+
 int report(const ReportArguments& a) {
     const ThreadLimit limit(1);
     const SweepPlan plan = plan_of_folder(a.folders.front());
@@ -48,9 +59,8 @@ int report(const ReportArguments& a) {
                         "merge` made are shown by `nephos report` of the folders that were merged");
     const std::filesystem::path out = a.out.empty() ? std::filesystem::path(a.folders.front()) / "report.html"
                                                     : std::filesystem::path(a.out);
-    // The lock of a sweep is empty, too.
-    const bool may_be_lock = out.filename() == "lock" && out.parent_path().filename() == "shards";
-    if (may_be_lock || !is_empty_file(out)) require_own(out, kReportBeginning, "`nephos report`");
+    for (const std::string& folder : a.folders) require_none_of_sweep(folder, out);
+    if (!is_empty_file(out)) require_own(out, kReportBeginning, "`nephos report`");
     write_report(plan, records, out);
     print_problems(records.problems());
     if (!a.work.quiet)

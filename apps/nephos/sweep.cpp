@@ -281,12 +281,21 @@ struct MergeArguments {
     WorkArguments work;
 };
 
+// Keeps sweeps from making other tables of a folder from before the plan and the records are read until those of merge are
+// written. None where no sweep has been, or may be: where its lock cannot be written, no shard can.
+std::unique_ptr<FolderGuard> guard_of_tables(const std::filesystem::path& folder) {
+    std::unique_ptr<FolderGuard> guard;
+    try {
+        if (is_there(folder / "shards")) guard = std::make_unique<FolderGuard>(folder);
+    } catch (const Error&) {
+    }
+    return guard;
+}
+
 int merge(const MergeArguments& a) {
     const ThreadLimit limit(1);
     const std::string out = a.out.empty() ? a.folders.front() : a.out;
-    // From before the plan and the records are read until the tables are written, no sweep makes others of the folder.
-    std::optional<FolderGuard> guard;
-    if (is_there(std::filesystem::path(out) / "shards")) guard.emplace(out);
+    const std::unique_ptr<FolderGuard> guard = guard_of_tables(out);
     const SweepPlan plan = plan_of_folder(a.folders.front());
     std::vector<std::filesystem::path> folders(a.folders.begin(), a.folders.end());
     const Records records = records_of_folders(plan, folders);

@@ -95,6 +95,8 @@ struct VdbContent {
     std::string wind_name = "vel";
     // Returns what the wind has in addition at a place of world space, m/s; may be empty. Called in one thread.
     std::function<Vec3(const Vec3& place_m)> wind_field;
+    // Called right before the file is begun and right before it gets its name (PublishCheck); may be empty.
+    std::function<void()> publish_check;
 };
 
 // Writes atomically (atomic_file.h): the file is complete or absent. Throws Error(usage) when the content

@@ -281,6 +281,7 @@ void write_vdb(const std::filesystem::path& path, const VdbContent& content, con
     const GridGeometry geometry = geometry_of(content);
     const openvdb::MetaMap meta = to_meta_map(metadata, geometry.voxels, geometry.refine);
     const auto grids = make_grids(content, geometry, meta);
+    const PublishCheck check(content.publish_check);
     write_atomically(
         path, [&](const std::filesystem::path& temporary) { write_file(temporary, path, grids, meta); });
 }

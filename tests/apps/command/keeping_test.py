@@ -82,6 +82,13 @@ class Keeping(Case):
         (self.folder / "h.png").write_bytes(height_map(20))
         for more in ([], ["--resume"]):
             self.kept("high", 2, *high, *more, says="another content of h.png of `ground.height_map`")
+        # Of statistics alone, whose run is complete: nothing to do, but for a table that is not its own.
+        for name, seed in (("five", 5), ("six", 6)):
+            self.call("run", self.scene, "--statistics-only", "--seed", seed, "-q", "--out", name)
+        self.call("run", self.scene, "--statistics-only", "--seed", 5, "-q", "--out", "five", "--resume")
+        shutil.copy(self.folder / "six/statistics.csv", self.folder / "five")
+        self.kept("five", 3, "run", self.scene, "--statistics-only", "--seed", 5, "-q", "--out", "five", "--resume",
+                  says="the table is of another run")
         # What loses nothing goes on, also with more steps.
         self.call(*self.plain, "--out", "out", "--resume", "--set", "time.steps=9")
         self.call(*self.plain, "--out", "whole", "--set", "time.steps=9")
@@ -170,6 +177,24 @@ class Keeping(Case):
         self.kept("exported", 2, "export", f"exported/{name}", "--for", "blender", "-o", "exported", "-q",
                   says=f"exported/{name}: lies in the folder that is written to")
         self.call("verify", "exported")
+
+    def test_a_run_that_is_put_in_the_place_of_another(self):
+        """The one that is moved away while it is at work writes nothing into it."""
+        self.call(*self.plain, "--seed", "8", "--set", "time.steps=60", "--out", "done")
+        before = self.files("done")
+        for n in range(12):
+            process = subprocess.Popen([NEPHOS, *map(str, self.plain), "--seed", "7", "--set", "time.steps=60", "--out", "out", "-j", "1"],
+                                       cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+            while process.poll() is None and not (self.folder / "out/density/tiny_0002.vdb").exists():
+                pass
+            time.sleep(0.002 * n)
+            (self.folder / "out").rename(self.folder / f"moved{n}")
+            (self.folder / "done").rename(self.folder / "out")
+            _, said = process.communicate(timeout=60)
+            self.assertIn(process.returncode, (0, 3), said)
+            (self.folder / "out").rename(self.folder / "done")
+            after = self.files("done")
+            self.assertEqual([path for path in sorted({*before, *after}) if before.get(path) != after.get(path)], [])
 
     def test_a_folder_that_is_moved_away_does_not_come_back(self):
         for n in range(6):

@@ -48,6 +48,53 @@ class Records(Case):
         self.assertEqual(writer.returncode, 0)
         self.assertGreater(looks, 1)
 
+    def test_a_part_of_a_study_compares_its_own_series(self):
+        """In whichever shard they are: with 0 a workflow would go on to tables that cannot be made."""
+        for shard in ("0/2", "1/2"):
+            self.sweep("two", "--shard", shard)
+        series = sorted((self.folder / "two/shards").glob("*.series"))
+        damaged, whole = sorted(series, key=lambda path: -path.stat().st_size)[0], None
+        number = int(damaged.name[:4])
+        self.flip(damaged, 30)
+        said = self.sweep("two", "--shard", f"{number}/2", status=3).stderr
+        self.assertIn("whose packed series are damaged", said)
+        self.assertIn("--overwrite computes the runs of this shard again", said)
+        self.sweep("two", "--shard", f"{1 - number}/2")
+        self.sweep("two", "--shard", f"{number}/2", "--overwrite")
+        self.call("merge", "two")
+        # Of another number of parts: done again where the other file is damaged.
+        self.sweep("one")
+        before = self.tables("one")
+        series = self.folder / "one/shards/0000-of-0001.series"
+        series.write_bytes(bytes(255 - byte for byte in series.read_bytes()))
+        for shard in ("0/2", "1/2"):
+            self.sweep("one", "--shard", shard, status=3)
+        (self.folder / "one/shards/0000-of-0001.jsonl").unlink()
+        series.unlink()
+        self.call("merge", "one")
+        self.assertEqual({name: text for name, text in self.tables("one").items() if name != "manifest.json"},
+                         {name: text for name, text in before.items() if name != "manifest.json"})
+
+    def test_many_parts_begin_at_once(self):
+        """What one has just put into the folder is no file of others to another one."""
+        for _ in range(6):
+            parts = [subprocess.Popen([NEPHOS, "sweep", self.null, "--axis", "field.background.ext=0.05,0.1", "--replicates", "1", "--steps", "20",
+                                       "--clouds-every", "0", "-q", "-j", "1", "--out", "at once", "--shard", f"{n}/12"], cwd=self.folder,
+                                      env=self.environment, stderr=subprocess.PIPE, text=True) for n in range(12)]
+            for part in parts:
+                _, said = part.communicate(timeout=60)
+                self.assertEqual(part.returncode, 0, said)
+            shutil.rmtree(self.folder / "at once")
+
+    def test_a_shard_that_is_begun_again_is_not_damaged(self):
+        self.sweep("again")
+        for _ in range(8):
+            writer = subprocess.Popen([NEPHOS, "sweep", self.null, "--axis", "field.background.ext=0.05,0.1", "--replicates", "2", "--steps", "20",
+                                       "--out", "again", "--overwrite", "-q"], cwd=self.folder, env=self.environment)
+            while writer.poll() is None:
+                self.sweep("again", "--status")
+            self.assertEqual(writer.returncode, 0)
+
     def test_a_flipped_bit_of_series_is_named_and_costs_one_run(self):
         self.sweep("whole")
         before = self.tables("whole")

@@ -172,6 +172,10 @@ class Report(Case):
             before = pathlib.Path(name).read_bytes()
             self.refused(2, "report", "a", "--out", name, says=f"{name}: is there, but `nephos report` did not write it")
             self.assertEqual(pathlib.Path(name).read_bytes(), before)
+        (self.folder / "link").symlink_to("a/shards/lock")
+        for name in ("a/shards/lock", "a/shards/./lock", "link"):
+            self.refused(2, "report", "a", "--out", name, says="is there, but")
+            self.assertEqual((self.folder / "a/shards/lock").read_bytes(), b"")
         empty = self.write("empty.html", "")
         for name in (empty, empty):
             self.call("report", "a", "--out", name)

@@ -144,6 +144,7 @@ class Verify(Case):
             def edited(key, value):
                 return json.dumps({**listing, key: value}, indent=2) + "\n"
             changed = [whole + "\n", whole.replace("  ", " ", 1), whole.replace('"xxh3": "', '"xxh3":  "'), json.dumps(listing),
+                       whole[:-44] + chr(ord(whole[-44]) ^ 1) + whole[-43:], '{"a": [], ' + whole[1:-50] + whole[-50:].replace('"xxh3"', '"xxg3"'),
                        edited("xxh3", "0" * 32), edited("note", "mine"), edited("nephos_version", "9.9")]
             if file == "manifest.json":
                 changed += [edited("run_files", listing["run_files"][:-1]), edited("bounds", {}),
