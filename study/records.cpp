@@ -6,7 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <span>
-#include <tuple>
+#include <thread>
 
 #include "study/folder_contents.h"
 #include "study/packed_series.h"
@@ -102,6 +102,7 @@ std::vector<const PlacedRecord*> with_damaged_series(const std::vector<PlacedRec
             order.push_back(&one);
     if (order.empty()) return damaged;
     std::ranges::sort(order, {}, [](const PlacedRecord* one) { return one->record.series_offset; });
+    if (!is_there(path)) return order;  // removed meanwhile
     std::ifstream stream = open_stream(path);
     std::string packed;
     std::uint64_t at = 0;
@@ -121,8 +122,9 @@ std::vector<const PlacedRecord*> with_damaged_series(const std::vector<PlacedRec
 }  // namespace
 
 std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesystem::path& path, RecordsFor use,
-                                                            const CheckedRuns& checked) {
-    const FileStamp begun = file_stamp(path);
+                                                            const CheckedRuns& checked, int look) {
+    const FileStamp begun = file_stamp(path),
+                    begun_series = file_stamp(std::filesystem::path(path).replace_extension(".series"));
     std::ifstream stream = open_stream(path);
     const auto shard = std::uint32_t(files_.size());
     files_.push_back({std::filesystem::path(path).replace_extension(".series"), folders_ - 1});
@@ -180,12 +182,16 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
                          one->record.series_offset, series_path.filename().string()));
         found[std::size_t(one - found.data())].is_sound = false;
     }
-    const FileStamp now = file_stamp(path);
-    if (!problem.empty() && std::tie(now.device, now.inode) != std::tie(begun.device, begun.inode)) {
-        // Begun again with --overwrite meanwhile: the series are those of the new one.
-        files_.pop_back();
-        return now == FileStamp{} ? std::pair<std::uint64_t, std::uint64_t>{}
-                                  : read_shard(path, use, checked);
+    // Begun again with --overwrite meanwhile, the records are of the old shard and the series of the new one, or of neither.
+    constexpr std::chrono::milliseconds kPause(50);
+    constexpr int kMostLooks = 40;
+    if (!problem.empty() && look < kMostLooks) {
+        std::this_thread::sleep_for(kPause);
+        if (!(file_stamp(path) == begun && file_stamp(series_path) == begun_series)) {
+            files_.pop_back();
+            return is_there(path) ? read_shard(path, use, checked, look + 1)
+                                  : std::pair<std::uint64_t, std::uint64_t>{};
+        }
     }
     for (PlacedRecord& one : found)
         if (one.is_sound) take(std::move(one.record));
@@ -224,6 +230,9 @@ Records Records::read(const std::vector<std::filesystem::path>& folders, Records
                 records.problems_.emplace_back(problem.what());
             } catch (const Error& problem) {
                 if (problem.code() != ErrorCode::io) throw;
+                std::error_code error;
+                const auto type = std::filesystem::symlink_status(file, error).type();
+                if (type == std::filesystem::file_type::not_found) continue;  // removed since it was listed
                 records.problems_.emplace_back(problem.what());
             }
         }

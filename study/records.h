@@ -79,7 +79,7 @@ class Records {
     // Reads a shard, and gives back the bytes of its records and those of the series that they refer to. Throws Error(io)
     // when it cannot be opened.
     std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path, RecordsFor use,
-                                                       const CheckedRuns& checked);
+                                                       const CheckedRuns& checked, int look = 0);
 
     // Keeps the last record of a run, but none of a failure where there is another.
     void take(RunRecord record);
