@@ -5,10 +5,10 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <random>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -248,16 +248,24 @@ void write_atomically(const std::filesystem::path& path, std::span<const std::by
     write_atomically(path, std::string_view(reinterpret_cast<const char*>(content.data()), content.size()));
 }
 
+void copy_atomically(const std::filesystem::path& from, const std::filesystem::path& to) {
+    const Descriptor file = open_regular_file(from, O_RDONLY);
+    std::vector<char> piece(std::size_t(256) << 10);
+    write_pieces_atomically(to, [&](const AppendPiece& append) {
+        for (;;) {
+            const ssize_t count = ::read(file.get(), piece.data(), piece.size());
+            if (count < 0 && errno == EINTR) continue;
+            if (count < 0) throw ReadFailure(from, std::strerror(errno));
+            if (count == 0) return;
+            append({piece.data(), std::size_t(count)});
+        }
+    });
+}
+
 bool separate_from_links(const std::filesystem::path& path) {
     struct stat status {};
     if (::lstat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode) || status.st_nlink < 2) return false;
-    std::ifstream stream = open_stream(path);
-    write_pieces_atomically(path, [&](const AppendPiece& append) {
-        std::string piece(std::size_t(1) << 20, '\0');
-        while (stream.read(piece.data(), std::streamsize(piece.size())) || stream.gcount() > 0)
-            append(std::string_view(piece).substr(0, std::size_t(stream.gcount())));
-        check_reading(stream, path);
-    });
+    copy_atomically(path, path);
     return true;
 }
 

@@ -23,7 +23,7 @@ enum class Access {
     owner,   // this user alone
 };
 
-// What becomes of folders on the way to the file that are missing.
+// Says what becomes of missing folders on the way to a file.
 enum class Folders {
     made,
     expected,  // an error: their owner has moved or removed them
@@ -64,8 +64,7 @@ class AtomicFile {
 
 // While one lives, AtomicFile calls `check` in this thread right before it creates a temporary file and right before it renames
 // one into place: what `check` throws keeps it from that. Of use where the writers in between, of libraries and formats, know
-// nothing of the folder's owner, who may move it away while they work. Each library that
-// is loaded by itself has its own.
+// nothing of the folder's owner, who may move it away while they work. Each library that is loaded by itself has its own.
 class PublishCheck {
   public:
     explicit PublishCheck(const std::function<void()>& check);
@@ -92,6 +91,9 @@ using AppendPiece = std::function<void(std::string_view piece)>;
 void write_pieces_atomically(const std::filesystem::path& path,
                              const std::function<void(const AppendPiece& append)>& fill,
                              Folders folders = Folders::made);
+
+// Copies a regular file piece by piece. Errors as above, and as open_regular_file() for `from`.
+void copy_atomically(const std::filesystem::path& from, const std::filesystem::path& to);
 
 // Gives a file that has other names as well (hard links, as `cp -l` makes them) its content once more under this name alone, so
 // that what is written into it or cut leaves theirs as it is. Returns whether it had; links to it (symbolic ones) are not

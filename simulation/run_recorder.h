@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a run leaves in its folder while it goes on: statistics, manifest and checkpoint, beside the files of frames. Private to
+// Keeps what a run leaves in its folder while it goes on: statistics, manifest and checkpoint, beside the files of frames. Private to
 // the module.
 
 #include <atomic>
@@ -84,7 +84,7 @@ class RunRecorder : public SimulationSink {
     // Throws Error(io) when something else has taken the place of a file, or a part of it.
     void require_size(const FileRecord& file) const;
 
-    // Of the files that belong to no frame, all but the manifest.
+    // Lists the files that belong to no frame, all but the manifest.
     std::vector<std::filesystem::path> run_files() const;
 
     // For frames of a run whose manifest, of an earlier version, names no digests.

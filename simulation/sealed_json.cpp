@@ -9,7 +9,7 @@
 namespace nephos {
 namespace {
 
-// What follows the last other member, but for the checksum itself.
+// Stand around the checksum, after the last other member.
 constexpr std::string_view kBefore = ",\n  \"xxh3\": \"", kAfter = "\"\n}\n";
 constexpr std::size_t kDigits = 32;
 
@@ -37,16 +37,18 @@ std::string sealed_text(std::string_view object) {
 
 Seal seal_of(const std::filesystem::path& list) {
     const std::string text = read_json_text(list);
-    // The last member of lists of earlier versions is an object or a list, which a text with one byte changed does not become.
-    const nlohmann::ordered_json json = parsed_json_text(text, JsonLists::left_out);
-    const char last = last_of(text);
-    if (json.is_object() && !json.contains(kSealKey) && (last == '}' || last == ']')) return Seal::none;
     constexpr std::size_t kSize = kBefore.size() + kDigits + kAfter.size();
-    if (text.size() < kSize) return Seal::broken;
-    const std::string_view before = std::string_view(text).substr(0, text.size() - kSize);
-    Digest digest;
-    digest.add(before);
-    return text.substr(before.size()) == seal_text(digest) ? Seal::whole : Seal::broken;
+    if (text.size() >= kSize) {
+        const std::string_view before = std::string_view(text).substr(0, text.size() - kSize);
+        Digest digest;
+        digest.add(before);
+        if (text.substr(before.size()) == seal_text(digest)) return Seal::whole;
+    }
+    // The last member of lists of earlier versions is an object or a list, which a text with one byte changed does not become.
+    const char last = last_of(text);
+    if (last != '}' && last != ']') return Seal::broken;
+    const nlohmann::ordered_json json = parsed_json_text(text, JsonLists::left_out);
+    return json.is_object() && !json.contains(kSealKey) ? Seal::none : Seal::broken;
 }
 
 }  // namespace nephos

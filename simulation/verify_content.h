@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What `nephos verify` says of the voxels of a run: each density file decoded, compared with the manifest, with the files of
+// Judges the voxels of a run for `nephos verify`: each density file decoded, compared with the manifest, with the files of
 // the layers and with the frame before. Private to the module.
 
 #include <vector>

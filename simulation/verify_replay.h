@@ -9,7 +9,7 @@
 namespace nephos {
 
 // Simulates `count` frames of the run from its first on, and compares their states and voxels with those of the manifest.
-// What the scene starts from must be as it was; otherwise the check is not done, and says why.
+// Takes what the scene starts from, which must be as it was; otherwise the check is not done, and says why.
 Check replay_frames(const RunListing& run, int count);
 
 }  // namespace nephos

@@ -11,6 +11,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "core/error.h"
 #include "simulation/export/export.h"
 #include "simulation/export/sequence.h"
 
@@ -81,6 +82,10 @@ const ListedExport::Sequence* sequence_of(const ListedExport& list, const std::s
 
 // Throws Error(io) naming the file, and the value that is not what it must be.
 ListedExport read_export(const std::filesystem::path& folder);
+
+// Returns whether an error is of a file of the export or of a source of one, whose names begin with the folder. Others, as that
+// a part of the program cannot be loaded, are no fault of the export.
+bool is_of_file_in(const std::filesystem::path& folder, const Error& error);
 
 // Compares the sidecars with the list, and with the box of their sources, where those are there and unchanged; none where there is
 // no sidecar. That of a complete export of volumes must be there.

@@ -2,19 +2,14 @@
 #include "simulation/export/frame_export.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 
-#include <fcntl.h>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
 #include "core/atomic_file.h"
-#include "core/descriptor.h"
 #include "core/error.h"
 #include "density/combine.h"
 #include "density/export/bricks.h"
@@ -70,20 +65,6 @@ bool is_copy(const ExportOptions& options, const ExportSequence& s, const Source
              const ExportSource& source) {
     return frame.is_plain && frame.listed == source.digest && s.layout.factor == 1 &&
            !options.half_voxel_shift && options.velocity_name.empty() && options.type != VoxelType::r16f;
-}
-
-void copy_whole(const std::filesystem::path& from, const std::filesystem::path& to) {
-    const Descriptor file = open_regular_file(from, O_RDONLY);
-    std::vector<char> piece(std::size_t(256) << 10);
-    write_pieces_atomically(to, [&](const AppendPiece& append) {
-        for (;;) {
-            const ssize_t count = ::read(file.get(), piece.data(), piece.size());
-            if (count < 0 && errno == EINTR) continue;
-            if (count < 0) throw ReadFailure(from, std::strerror(errno));
-            if (count == 0) return;
-            append({piece.data(), std::size_t(count)});
-        }
-    });
 }
 
 std::vector<Volume> levels_of(const DensityGrid& density, const ExportSequence& s) {
@@ -149,7 +130,7 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
         }
         const std::filesystem::path path = options_.folder / name;
         if (format == ExportFormat::vdb && is_copy(options_, s, frame, source)) {
-            copy_whole(frame.file, path);
+            copy_atomically(frame.file, path);
         } else if (format == ExportFormat::vdb) {
             write_vdb_file(path, options_, s, loaded);
         } else if (format == ExportFormat::flightgear) {

@@ -156,8 +156,7 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
         } catch (const ReadFailure&) {
             throw;
         } catch (const Error& failure) {
-            // What says nothing of a file, as that a part of the program cannot be loaded, is no fault of the export.
-            if (!std::string_view(failure.what()).starts_with(folder.string())) throw;
+            if (!is_of_file_in(folder, failure)) throw;
             if (bad++ == 0) problem = failure.what();
         }
     }
@@ -202,6 +201,10 @@ const ListedExport::Sequence* sequence_of(const ListedExport& list, const std::s
             best = &s;
     }
     return best;
+}
+
+bool is_of_file_in(const std::filesystem::path& folder, const Error& error) {
+    return std::string_view(error.what()).starts_with(folder.string());
 }
 
 Verification verify_export(const std::filesystem::path& folder, const VerifyOptions& options) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <set>
-#include <string_view>
 
 #include <fmt/format.h>
 
@@ -155,8 +154,7 @@ std::optional<Check> check_sidecars(const std::filesystem::path& folder, const L
         } catch (const ReadFailure&) {
             throw;
         } catch (const Error& error) {
-            // What says nothing of a file, as that a part of the program cannot be loaded, is no fault of the export.
-            if (!std::string_view(error.what()).starts_with(folder.string())) throw;
+            if (!is_of_file_in(folder, error)) throw;
             if (bad++ == 0) problem = error.what();
         }
     }
