@@ -25,13 +25,6 @@ namespace {
     throw Error(ErrorCode::io, path.string() + ": " + what + ": " + std::strerror(error));
 }
 
-void flush_file(const std::filesystem::path& file, const std::filesystem::path& reported) {
-    const Descriptor descriptor(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
-    if (descriptor.get() < 0) fail(reported, "cannot open after writing", errno);
-    const int error = flush_to_device(descriptor.get());
-    if (error != 0 && error != EINVAL) fail(reported, "cannot flush to the device", error);
-}
-
 // Returns false for a link of another user but root: in a folder that others may write to, it waits there to have a file
 // of ours replaced.
 bool is_trusted_link(const std::filesystem::path& link) {
@@ -123,24 +116,39 @@ PublishCheck::PublishCheck(const std::function<void()>& check) : before_(publish
 PublishCheck::~PublishCheck() { publish_check = before_; }
 
 AtomicFile::AtomicFile(const std::filesystem::path& given, Access access, Folders folders)
-    : path_(target_of(given)) {
+    : path_(target_of(given)), name_(path_.filename().string()) {
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
     check_before_publishing();
     if (folders == Folders::made) create_folders(folder);
-    create_temporary(folder, access);
+    open_folder(folder);
+    try {
+        check_before_publishing();  // of the folder that is open now
+        create_temporary(folder, access);
+    } catch (...) {
+        ::close(folder_);
+        throw;
+    }
+}
+
+// For its names alone where it may not be listed.
+void AtomicFile::open_folder(const std::filesystem::path& folder) {
+    constexpr int kFlags = O_DIRECTORY | O_CLOEXEC;
+    folder_ = ::open(folder.c_str(), O_RDONLY | kFlags);
+    if (folder_ < 0 && errno == EACCES) folder_ = ::open(folder.c_str(), O_PATH | kFlags);
+    if (folder_ < 0) fail(path_, "cannot create", errno);
 }
 
 // Takes over owner, group and permissions of the file that is replaced, before there is content that others might read. What
 // another user put there says nothing, but for root in a folder that nobody else may write to. Throws Error(io) where the new
 // file would be open to more.
-void AtomicFile::take_permissions(int fd, const std::filesystem::path& folder) {
+void AtomicFile::take_permissions(int fd) {
     struct stat before {
     }, parent{}, now{};
-    if (::stat(path_.c_str(), &before) != 0 || !S_ISREG(before.st_mode)) return;
+    if (::fstatat(folder_, name_.c_str(), &before, 0) != 0 || !S_ISREG(before.st_mode)) return;
     if (before.st_uid != ::geteuid()) {
         constexpr mode_t kOthersWrite = S_IWGRP | S_IWOTH;
         const bool is_sound =
-            ::geteuid() == 0 && ::stat(folder.c_str(), &parent) == 0 && (parent.st_mode & kOthersWrite) == 0;
+            ::geteuid() == 0 && ::fstat(folder_, &parent) == 0 && (parent.st_mode & kOthersWrite) == 0;
         if (!is_sound || ::fchown(fd, before.st_uid, gid_t(-1)) != 0) return;
     }
     mode_t permissions = before.st_mode & kPermissions;
@@ -162,24 +170,24 @@ void AtomicFile::create_temporary(const std::filesystem::path& folder, Access ac
     std::random_device random;
     for (int attempt = 1;; ++attempt) {
         const std::uint64_t number = std::uint64_t{random()} << 32 | random();
-        temporary_ =
-            folder / temporary_name(path_, std::to_string(::getpid()) + "-" + std::to_string(number));
-        const Descriptor descriptor(
-            ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
+        temporary_name_ = temporary_name(path_, std::to_string(::getpid()) + "-" + std::to_string(number));
+        temporary_ = folder / temporary_name_;
+        const Descriptor descriptor(::openat(folder_, temporary_name_.c_str(),
+                                             O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
         if (descriptor.get() < 0 && errno == EEXIST && attempt < kAttempts) continue;
         struct stat status {};
         if (descriptor.get() < 0) fail(path_, "cannot create", errno);
         if (::fstat(descriptor.get(), &status) != 0) {
             const int error = errno;
-            ::unlink(temporary_.c_str());
+            remove();
             fail(path_, "cannot examine its temporary file", error);
         }
         device_ = status.st_dev;
         inode_ = status.st_ino;
         try {
-            if (access == Access::shared) take_permissions(descriptor.get(), folder);
+            if (access == Access::shared) take_permissions(descriptor.get());
         } catch (const Error&) {
-            ::unlink(temporary_.c_str());
+            remove();
             throw;
         }
         return;
@@ -188,34 +196,50 @@ void AtomicFile::create_temporary(const std::filesystem::path& folder, Access ac
 
 AtomicFile::~AtomicFile() {
     struct stat status {};
-    if (!published_ && ::lstat(temporary_.c_str(), &status) == 0 && is_created_file(status))
-        ::unlink(temporary_.c_str());
+    if (!published_ && ::fstatat(folder_, temporary_name_.c_str(), &status, AT_SYMLINK_NOFOLLOW) == 0 &&
+        is_created_file(status))
+        remove();
+    ::close(folder_);
 }
+
+void AtomicFile::remove() const { ::unlinkat(folder_, temporary_name_.c_str(), 0); }
 
 // Returns true for the file that the constructor created.
 bool AtomicFile::is_created_file(const struct stat& status) const {
     return status.st_dev == device_ && status.st_ino == inode_ && S_ISREG(status.st_mode);
 }
 
+// Returns a descriptor of the temporary file, or -1.
+int AtomicFile::open_again() const {
+    return ::openat(folder_, temporary_name_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
+}
+
 void AtomicFile::publish() {
     struct stat status {};
+    // By its path, as its writer found it: in another folder of that name there would be its content.
     if (::lstat(temporary_.c_str(), &status) != 0) fail(path_, "its temporary file is gone", errno);
-    if (!is_created_file(status))
-        throw Error(ErrorCode::io,
-                    path_.string() + ": another file was put in the place of its temporary one");
-    flush_file(temporary_, path_);
-    if (permissions_ && *permissions_ != (status.st_mode & kPermissions)) {
-        const Descriptor descriptor(::open(temporary_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
-        if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0 || !is_created_file(status) ||
-            ::fchmod(descriptor.get(), *permissions_) != 0)
-            fail(path_, "cannot set its permissions", errno);
-    }
+    const auto refuse_other = [&] {
+        if (!is_created_file(status))
+            throw Error(ErrorCode::io,
+                        path_.string() + ": another file was put in the place of its temporary one");
+    };
+    refuse_other();
+    const Descriptor file(open_again());
+    if (file.get() < 0) fail(path_, "cannot open after writing", errno);
+    if (::fstat(file.get(), &status) != 0) fail(path_, "cannot examine its temporary file", errno);
+    refuse_other();
+    const int error = flush_to_device(file.get());
+    if (error != 0 && error != EINVAL) fail(path_, "cannot flush to the device", error);
+    if (permissions_ && *permissions_ != (status.st_mode & kPermissions) &&
+        ::fchmod(file.get(), *permissions_) != 0)
+        fail(path_, "cannot set its permissions", errno);
     check_before_publishing();
-    std::error_code error;
-    std::filesystem::rename(temporary_, path_, error);
-    if (error) fail(path_, "cannot rename into place", error.value());
+    if (::renameat(folder_, temporary_name_.c_str(), folder_, name_.c_str()) != 0)
+        fail(path_, "cannot rename into place", errno);
     published_ = true;
-    flush_folder(temporary_.parent_path(), path_);
+    const int unflushed = flush_to_device(folder_);
+    if (unflushed != 0 && unflushed != EINVAL && unflushed != EBADF)  // which may not be listed
+        fail(path_, "cannot flush its folder to the device", unflushed);
 }
 
 void write_atomically(const std::filesystem::path& path,

@@ -30,7 +30,7 @@ enum class Folders {
 };
 
 // A file that is written under a temporary name until it is complete. write_atomically() and the functions below it use
-// one.
+// one. It holds its folder open: whatever else is given the folder's name meanwhile gets no file.
 class AtomicFile {
   public:
     // Creates an empty temporary file whose name nobody can foresee beside `path`; missing parent folders as `folders` has
@@ -51,19 +51,24 @@ class AtomicFile {
     void publish();
 
   private:
+    void open_folder(const std::filesystem::path& folder);
     void create_temporary(const std::filesystem::path& folder, Access access);
-    void take_permissions(int fd, const std::filesystem::path& folder);
+    void take_permissions(int fd);
     bool is_created_file(const struct stat& status) const;
+    int open_again() const;
+    void remove() const;
 
     std::filesystem::path path_, temporary_;
+    std::string name_, temporary_name_;  // in the folder
+    int folder_ = -1;                    // descriptor of it
     dev_t device_ = 0;
     ino_t inode_ = 0;
     std::optional<mode_t> permissions_;  // of the file that is replaced
     bool published_ = false;
 };
 
-// While one lives, AtomicFile calls `check` in this thread right before it creates a temporary file and right before it renames
-// one into place: what `check` throws keeps it from that. Of use where the writers in between, of libraries and formats, know
+// While one lives, AtomicFile calls `check` in this thread before it makes folders, when it has opened the file's folder, and before
+// it renames the file in there: what `check` throws keeps it from going on. Of use where the writers in between, of libraries and formats, know
 // nothing of the folder's owner, who may move it away while they work. Each library that is loaded by itself has its own.
 class PublishCheck {
   public:

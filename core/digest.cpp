@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/digest.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <new>
@@ -55,13 +56,14 @@ void Digest::add(std::span<const std::byte> bytes) {
 
 std::string Digest::hex() const { return hex_of(XXH3_128bits_digest(state_->xxh3.get())); }
 
-FileDigest file_digest(const std::filesystem::path& path) {
+FileDigest file_digest(const std::filesystem::path& path, std::uint64_t most) {
     const Descriptor file = open_regular_file(path, O_RDONLY);
     std::vector<std::byte> piece(kPieceBytes);
     Digest digest;
     FileDigest result;
-    for (;;) {
-        const ssize_t count = ::read(file.get(), piece.data(), piece.size());
+    while (result.bytes < most) {
+        const std::size_t wanted = std::size_t(std::min<std::uint64_t>(piece.size(), most - result.bytes));
+        const ssize_t count = ::read(file.get(), piece.data(), wanted);
         if (count < 0 && errno == EINTR) continue;
         if (count < 0) throw ReadFailure(path, std::strerror(errno));
         if (count == 0) break;

@@ -38,8 +38,8 @@ struct FileDigest {
     bool operator==(const FileDigest&) const = default;
 };
 
-// Reads a regular file to its end. Throws Error(io) naming the path. Thread-safe.
-FileDigest file_digest(const std::filesystem::path& path);
+// Reads a regular file, to its end or at most so many bytes. Throws Error(io) naming the path. Thread-safe.
+FileDigest file_digest(const std::filesystem::path& path, std::uint64_t most = ~std::uint64_t{0});
 
 // Returns the checksum of bytes in memory. Thread-safe; pure.
 std::string digest_of(std::span<const std::byte> bytes);

@@ -35,6 +35,17 @@ std::vector<std::filesystem::path> holders_of_missing(std::filesystem::path fold
     return holders;
 }
 
+// Flushes which files are in a folder to the device. Some file systems cannot, and a folder that may be written but not read
+// cannot be opened: there nothing is done. Throws Error(io) naming `reported`.
+void flush_folder(const std::filesystem::path& folder, const std::filesystem::path& reported) {
+    const Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (descriptor.get() < 0 && errno == EACCES) return;
+    if (descriptor.get() < 0) fail(reported, "cannot open its folder after writing", std::strerror(errno));
+    const int error = flush_to_device(descriptor.get());
+    if (error != 0 && error != EINVAL)
+        fail(reported, "cannot flush its folder to the device", std::strerror(error));
+}
+
 }  // namespace
 
 void create_folders(const std::filesystem::path& folder) {
@@ -45,13 +56,11 @@ void create_folders(const std::filesystem::path& folder) {
     for (const std::filesystem::path& holder : holders) flush_folder(holder, folder);
 }
 
-void flush_folder(const std::filesystem::path& folder, const std::filesystem::path& reported) {
-    const Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (descriptor.get() < 0 && errno == EACCES) return;
-    if (descriptor.get() < 0) fail(reported, "cannot open its folder after writing", std::strerror(errno));
-    const int error = flush_to_device(descriptor.get());
-    if (error != 0 && error != EINVAL)
-        fail(reported, "cannot flush its folder to the device", std::strerror(error));
+bool stands_there(const std::filesystem::path& path) {
+    std::error_code error;
+    const auto type = std::filesystem::symlink_status(path, error).type();
+    if (type == std::filesystem::file_type::none) throw ReadFailure(path, error.message(), "examine");
+    return type != std::filesystem::file_type::not_found;
 }
 
 std::filesystem::path normal_path(const std::filesystem::path& path) {

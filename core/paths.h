@@ -11,9 +11,8 @@ namespace nephos {
 // later are not lost with their folder. Does nothing where the folder is there. Throws Error(io) naming `folder`.
 void create_folders(const std::filesystem::path& folder);
 
-// Flushes which files are in a folder to the device. Some file systems cannot, and a folder that may be written but not read
-// cannot be opened: there nothing is done. Throws Error(io) naming `reported`.
-void flush_folder(const std::filesystem::path& folder, const std::filesystem::path& reported);
+// Returns whether something stands at a path, links not followed. Throws ReadFailure where the system cannot say.
+bool stands_there(const std::filesystem::path& path);
 
 // Returns the path without "." and "..": by its text where that leads to the same file as the system's way, otherwise, where
 // ".." goes back through a link, with the links of its folder resolved. Where nothing is there it is by its text.
