@@ -191,7 +191,7 @@ void require_tables_of_other_run(const RunSettings& settings, std::uint64_t step
                 fmt::format("{}: is not of the run in the folder that it lies in, whose statistics the "
                             "branch begins with",
                             settings.branch->checkpoint.string()));
-        require_table_of_run(parent.statistics(), run.steps_reported, run.state_hash);
+        require_tables_of_run(parent, run);
     }
     read_statistics(parent.statistics(), steps, {}, kStatisticsHeader);
     for (const LayerOptions& layer : settings.scene.layers)

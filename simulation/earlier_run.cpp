@@ -16,6 +16,7 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/file_stamp.h"
+#include "core/paths.h"
 #include "scenes/format/writer.h"
 #include "simulation/manifest.h"
 #include "simulation/statistics_file.h"
@@ -64,14 +65,6 @@ std::vector<std::string> frame_parts(const RunFolder& folder) {
     return parts;
 }
 
-// Returns whether something is there, links not followed. Throws ReadFailure where the system cannot say.
-bool is_in_place(const std::filesystem::path& path) {
-    std::error_code error;
-    const auto type = std::filesystem::symlink_status(path, error).type();
-    if (type == std::filesystem::file_type::none) throw ReadFailure(path, error.message(), "examine");
-    return type != std::filesystem::file_type::not_found;
-}
-
 // Returns the name of the scene of the run that is in the folder; empty where none tells it.
 std::string earlier_name(const RunFolder& folder) {
     std::error_code error;
@@ -107,7 +100,7 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     for (const std::string& name : names) others.push_back(RunFolder{folder.folder, name}.video());
     others.push_back(folder.manifest());
     for (const std::filesystem::path& path : others)
-        if (is_in_place(path)) files.push_back(path);
+        if (stands_there(path)) files.push_back(path);
     return files;
 }
 
@@ -274,7 +267,7 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const 
                     Resumption found) {
     for (const LayerOptions& layer : settings.scene.layers) {
         const std::filesystem::path table = folder.statistics(layer.name);
-        if (!is_in_place(table) || is_statistics(table, kLayerStatisticsHeader) ||
+        if (!stands_there(table) || is_statistics(table, kLayerStatisticsHeader) ||
             is_begun_statistics(table, kLayerStatisticsHeader))
             continue;
         refuse(folder, fmt::format("the folder holds a {} that is not of a run",
@@ -338,10 +331,18 @@ Resumption find_resumption(const RunSettings& settings, const RunFolder& folder)
     const EarlierRun earlier = read_manifest(folder.manifest());
     const Scene before = scene_before(earlier, settings, folder);
     const bool same = earlier.range == settings.range && earlier.render == settings.render;
-    if (same && earlier.complete && settings.statistics_only) return Resumption::complete;
+    // A checkpoint that is asked for is made by running once more.
+    if (same && earlier.complete && settings.statistics_only && !settings.checkpoint)
+        return Resumption::complete;
     if (!same && earlier.range != range_before(settings, before))
         refuse(folder, "it holds a run of the same scene for " + range_text(earlier));
     return Resumption::start_anew;
+}
+
+void require_tables_of_run(const RunFolder& folder, const EarlierRun& run, std::string_view cure) {
+    for (const FileRecord& table : run.tables)
+        if (const std::filesystem::path path = folder.folder / table.path; is_there(path))
+            require_table_of_run(path, table.digest, cure);
 }
 
 void remove_checkpoint(const RunFolder& folder) { remove_file(folder.checkpoint()); }

@@ -6,8 +6,10 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "simulation/manifest.h"
 #include "simulation/run_folder.h"
 #include "simulation/run_inputs.h"
 #include "simulation/simulation.h"
@@ -43,6 +45,10 @@ void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput
 
 // Throws Error(usage) when the folder holds a run of another scene, Error(io) when its manifest cannot be read.
 Resumption find_resumption(const RunSettings& settings, const RunFolder& folder);
+
+// Throws Error(io) unless the tables of statistics begin with what the manifest says that the run had written, as
+// require_table_of_run(). One that is not there is its reader's to miss.
+void require_tables_of_run(const RunFolder& folder, const EarlierRun& run, std::string_view cure = {});
 
 // Removes the checkpoint of a complete run. Throws Error(io).
 void remove_checkpoint(const RunFolder& folder);

@@ -217,6 +217,13 @@ Json inputs_json(const std::vector<RunInput>& inputs) {
     return files;
 }
 
+Json tables_json(const std::vector<FileRecord>& tables) {
+    Json files;
+    for (const FileRecord& table : tables)
+        files[table.path] = {{"bytes", table.digest.bytes}, {"xxh3", table.digest.xxh3}};
+    return files;
+}
+
 // All that stands before the list of frames.
 Json head_json(const RunSettings& settings, const ManifestState& state) {
     const Scene& scene = settings.scene;
@@ -255,6 +262,7 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
     if (state.complete && settings.render && scene.frames.video) {
         json["files"]["video"] = relative(settings, folder.video());
     }
+    if (!state.tables.empty()) json["tables"] = tables_json(state.tables);
     if (!state.inputs.empty()) json["inputs"] = inputs_json(state.inputs);
     json["frames_per_second"] = scene.frames.per_second;
     json["time_scale"] = scene.frames.time_scale;
@@ -291,6 +299,19 @@ FileRecord file_record(const Json& json, const std::filesystem::path& manifest) 
     return {path.string(),
             {json.at("bytes").get<std::uint64_t>(), json.at("xxh3").get<std::string>()},
             json.value("voxels_xxh3", std::string())};
+}
+
+std::vector<FileRecord> tables_of(const Json& manifest, const std::filesystem::path& path) {
+    std::vector<FileRecord> tables;
+    if (!manifest.contains("tables")) return tables;
+    for (const auto& [name, file] : manifest.at("tables").items()) {
+        if (!is_inside_folder(name))
+            throw Error(ErrorCode::io, fmt::format("{}: lists the table \"{}\", which is none of its folder",
+                                                   path.string(), shortened(name)));
+        tables.push_back(
+            {name, {file.at("bytes").get<std::uint64_t>(), file.at("xxh3").get<std::string>()}, {}});
+    }
+    return tables;
 }
 
 void write_manifest(const RunSettings& settings, const ManifestState& state) {
@@ -429,6 +450,7 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
             for (const auto& [key, value] : json.at("parameters").items())
                 run.parameters.emplace_back(key, value.get<std::string>());
         }
+        run.tables = tables_of(json, path);
         if (json.contains("inputs")) {
             for (const auto& [key, file] : json.at("inputs").items())
                 run.inputs.push_back(

@@ -53,6 +53,8 @@ struct ManifestState {
     std::uint64_t steps_reported = 0;
     std::string state_hash;  // at the last reported step
     std::vector<FrameRecord> frames;
+    std::vector<FileRecord>
+        tables;  // of statistics, up to the reported steps; a run that goes on has appended more since
     std::vector<FileRecord> run_files;  // of a complete run: those of no frame, but for the manifest
     std::vector<RunInput> inputs;       // files that the scene names
     std::map<int, std::vector<RainRecord>> rain;  // by number of the frame; frames without rain left out
@@ -75,6 +77,9 @@ std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& pa
 // when the value is impossible, or json::exception when it is of another kind.
 FileRecord file_record(const nlohmann::ordered_json& json, const std::filesystem::path& manifest);
 int frame_number(const nlohmann::ordered_json& json, const std::filesystem::path& manifest);
+
+// Returns the tables of statistics that a manifest lists, as above; none where it is of an earlier version.
+std::vector<FileRecord> tables_of(const nlohmann::ordered_json& manifest, const std::filesystem::path& path);
 
 // Returns whether a path of a list leads to something below the list's folder, without detours.
 bool is_inside_folder(const std::filesystem::path& path);
@@ -103,6 +108,7 @@ struct EarlierRun {
     std::string state_hash;  // at the last of these
     // Of scenes/format/writer.h: keys of its scene that are not at their defaults.
     std::vector<std::pair<std::string, std::string>> parameters;
+    std::vector<FileRecord> tables;     // of statistics; none in manifests of earlier versions
     std::vector<RunInput> inputs;       // none in manifests of earlier versions
     std::optional<BranchPoint> branch;  // of a run that branched off another one
 };

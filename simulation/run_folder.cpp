@@ -110,7 +110,7 @@ RunReport report_of_complete(const RunSettings& settings, const RunFolder& folde
     RunReport report = report_head(settings);
     report.complete = report.skipped = true;
     const EarlierRun earlier = read_manifest(folder.manifest());
-    require_table_of_run(folder.statistics(), earlier.steps_reported, earlier.state_hash, kStartAnew);
+    require_tables_of_run(folder, earlier, kStartAnew);
     report.first_step = report.steps_taken = settings.range.last_step;
     report.steps_reported = settings.range.last_step + 1;
     read_statistics(

@@ -58,6 +58,7 @@ RunListing read_run(const std::filesystem::path& folder) {
         text = json.at("scene_text").get<std::string>();
         given = json.value("scene_given", std::string());
         for (const Json& frame : json.at("frames")) run.frames.push_back(frame_of(frame, path));
+        run.tables = tables_of(json, path);
         if (json.contains("run_files"))
             for (const Json& file : json.at("run_files")) run.run_files.push_back(file_record(file, path));
     } catch (const nlohmann::json::exception&) {

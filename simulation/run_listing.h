@@ -32,6 +32,7 @@ struct RunListing {
     SimulationRange range;
     std::uint64_t steps_reported = 0;
     std::vector<ListedFrame> frames;    // in the manifest's order
+    std::vector<FileRecord> tables;     // of statistics, up to the reported steps; none of an earlier version
     std::vector<FileRecord> run_files;  // of a complete run
     std::vector<RunInput> inputs;  // files that the scene names; none in a manifest of an earlier version
     std::optional<BranchPoint> branch;  // of a run that branched off another one

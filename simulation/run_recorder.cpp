@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "automaton/checkpoint.h"
+#include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/paths.h"
 #include "density/vdb/vdb_file.h"
@@ -46,7 +47,7 @@ void RunRecorder::set_guard(std::function<void()> guard) {
 
 void RunRecorder::begin() {
     write_manifest(false, 0);
-    if (guard_) guard_();
+    const PublishCheck check(guard_);
     statistics_ = StatisticsFile::create(folder_.statistics());
     if (!settings_.scene.layers.empty()) create_folders(folder_.folder / "statistics");
     for (const LayerOptions& layer : settings_.scene.layers) {
@@ -59,6 +60,7 @@ void RunRecorder::begin_branch(const Simulation& simulation) {
     require_tables_of_other_run(settings_, simulation.next_step());
     remove_earlier_run(folder_);
     write_manifest(false, 0);
+    const PublishCheck check(guard_);
     copy_tables_of_other_run(settings_, folder_, simulation.next_step());
     statistics_ = StatisticsFile::resume(
         folder_.statistics(), simulation.next_step(),
@@ -67,6 +69,7 @@ void RunRecorder::begin_branch(const Simulation& simulation) {
         layer_statistics_.push_back(StatisticsFile::resume(
             folder_.statistics(layer.name), simulation.next_step(), {}, kLayerStatisticsHeader));
     state_.steps_reported = simulation.next_step();
+    note_tables();
     write_manifest(false, 0);
 }
 
@@ -81,7 +84,7 @@ void RunRecorder::take_over(const Simulation& simulation) {
         }
     };
     const EarlierRun earlier = read_manifest(folder_.manifest());
-    require_table_of_run(folder_.statistics(), earlier.steps_reported, earlier.state_hash, kStartAnew);
+    require_tables_of_run(folder_, earlier, kStartAnew);
     // Frames before the first row of their step cannot be: a range of frames reports every step from 0.
     statistics_ = StatisticsFile::resume(folder_.statistics(), simulation.next_step(), record_frames_of);
     frames_done_ = int(state_.frames.size());
@@ -89,6 +92,7 @@ void RunRecorder::take_over(const Simulation& simulation) {
         layer_statistics_.push_back(StatisticsFile::resume(
             folder_.statistics(layer.name), simulation.next_step(), {}, kLayerStatisticsHeader));
     }
+    note_tables();
     if (!settings_.scene.layers.empty()) state_.rain = read_rain(folder_.manifest());
     std::erase_if(state_.rain, [&](const auto& rain) { return rain.first >= simulation.next_frame(); });
     state_.steps_reported = simulation.next_step();
@@ -128,7 +132,9 @@ void RunRecorder::save(Simulation& simulation, double wall_s, bool with_checkpoi
     output_.finish();
     statistics_->save();
     for (StatisticsFile& file : layer_statistics_) file.save();
+    note_tables();
     write_manifest(false, wall_s);
+    const PublishCheck check(guard_);
     if (with_checkpoint) write_checkpoint(folder_.checkpoint(), simulation.save());
 }
 
@@ -139,6 +145,7 @@ void RunRecorder::list_finished_frames(double wall_s) noexcept {
         state.steps_reported = steps_saved_;
         state.state_hash = hash_saved_;
         state.wall_s = wall_s;
+        const PublishCheck check(guard_);
         nephos::write_manifest(settings_, state);
     } catch (const std::exception&) {
     }
@@ -152,6 +159,7 @@ void RunRecorder::write_manifest(bool complete, double wall_s) {
             state_.run_files.push_back({relative(path), file_digest(path), {}});
     }
     state_.wall_s = wall_s;
+    const PublishCheck check(guard_);
     nephos::write_manifest(settings_, state_);
     steps_saved_ = state_.steps_reported;
     hash_saved_ = state_.state_hash;
@@ -182,6 +190,14 @@ std::vector<RunFiles> RunRecorder::frame_files() const {
 
 std::string RunRecorder::relative(const std::filesystem::path& path) const {
     return path.lexically_relative(settings_.folder).generic_string();
+}
+
+void RunRecorder::note_tables() {
+    state_.tables = {{relative(folder_.statistics()), statistics_->content(), {}}};
+    for (std::size_t n = 0; n < layer_statistics_.size(); ++n)
+        state_.tables.push_back({relative(folder_.statistics(settings_.scene.layers[n].name)),
+                                 layer_statistics_[n].content(),
+                                 {}});
 }
 
 std::vector<std::filesystem::path> RunRecorder::run_files() const {

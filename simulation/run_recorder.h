@@ -84,6 +84,9 @@ class RunRecorder : public SimulationSink {
     // Throws Error(io) when something else has taken the place of a file, or a part of it.
     void require_size(const FileRecord& file) const;
 
+    // Notes what the tables hold, for the manifest.
+    void note_tables();
+
     // Lists the files that belong to no frame, all but the manifest.
     std::vector<std::filesystem::path> run_files() const;
 

@@ -95,24 +95,13 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
     return bytes;
 }
 
-void require_table_of_run(const std::filesystem::path& path, std::uint64_t steps, const std::string& hash,
-                          std::string_view cure) {
-    if (steps == 0 || hash.empty()) return;
-    StateHash last;
-    try {
-        read_statistics(path, steps,
-                        [&](std::uint64_t, std::string_view, const StateHash& of_row) { last = of_row; });
-    } catch (const ReadFailure&) {
-        throw;
-    } catch (const Error&) {
-        return;  // cut after the manifest was written, or damaged, which its reader says
-    }
-    if (last.hex() != hash)
-        throw Error(
-            ErrorCode::io,
-            fmt::format("{}: step {} has another state than in manifest.json: the table is of another "
-                        "run{}",
-                        path.string(), steps - 1, cure));
+void require_table_of_run(const std::filesystem::path& path, const FileDigest& saved, std::string_view cure) {
+    const FileDigest found = file_digest(path, saved.bytes);
+    if (found.bytes == saved.bytes && found.xxh3 != saved.xxh3)
+        throw Error(ErrorCode::io,
+                    fmt::format("{}: does not begin with the {} bytes that the run had written: it was "
+                                "changed, or is of another run{}",
+                                path.string(), saved.bytes, cure));
 }
 
 bool is_statistics(const std::filesystem::path& path, std::string_view header) {
@@ -125,26 +114,37 @@ bool is_begun_statistics(const std::filesystem::path& path, std::string_view hea
     return text && header.starts_with(*text);
 }
 
-StatisticsFile::StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size)
-    : path_(std::move(path)), file_(std::move(file)), size_(size) {}
+StatisticsFile::StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size, Digest digest)
+    : path_(std::move(path)), file_(std::move(file)), size_(size), digest_(std::move(digest)) {}
 
 StatisticsFile StatisticsFile::create(const std::filesystem::path& path, std::string_view header) {
-    ::unlink(path.c_str());  // so that no link is followed
+    std::error_code error;
+    if (std::filesystem::is_symlink(path, error)) ::unlink(path.c_str());  // its target is somebody's
     write_atomically(path, header);
-    return StatisticsFile(path, open_regular_file(path, O_WRONLY | O_APPEND | O_NOFOLLOW), header.size());
+    Digest digest;
+    digest.add(header);
+    return StatisticsFile(path, open_regular_file(path, O_WRONLY | O_APPEND | O_NOFOLLOW), header.size(),
+                          std::move(digest));
 }
 
 StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::uint64_t steps,
                                       const StatisticsVisitor& visit, std::string_view header) {
     separate_from_links(path);  // a copy of the run may be made of them
     Descriptor file = open_regular_file(path, O_WRONLY | O_APPEND | O_NOFOLLOW);
-    const std::uint64_t size = read_statistics(path, steps, visit, header, kStartAnew);
+    Digest digest;
+    digest.add(header);
+    const auto add_row = [&](std::uint64_t step, std::string_view row, const StateHash& hash) {
+        digest.add(row);
+        digest.add("\n");
+        if (visit) visit(step, row, hash);
+    };
+    const std::uint64_t size = read_statistics(path, steps, add_row, header, kStartAnew);
     if (!is_same_file(file.get(), path))  // what is cut is what was read
         throw Error(ErrorCode::io, path.string() + ": was removed or replaced while it was read");
     struct stat status {};
     const bool is_whole = ::fstat(file.get(), &status) == 0 && std::uint64_t(status.st_size) == size;
     if (!is_whole && ::ftruncate(file.get(), off_t(size)) != 0) fail(path, errno);
-    return StatisticsFile(path, std::move(file), size);
+    return StatisticsFile(path, std::move(file), size, std::move(digest));
 }
 
 void StatisticsFile::add(std::string_view row) {
@@ -166,6 +166,7 @@ void StatisticsFile::write_out() {
         fail(path_, error);
     }
     size_ += gathered_.size();
+    digest_.add(gathered_);
     gathered_.clear();
 }
 

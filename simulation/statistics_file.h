@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "core/descriptor.h"
+#include "core/digest.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -40,9 +41,10 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
                               const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader,
                               std::string_view cure = {});
 
-// Throws Error(io) when the last of `steps` rows has another state than `hash`: then the table is of another run. A table that
-// has fewer rows passes.
-void require_table_of_run(const std::filesystem::path& path, std::uint64_t steps, const std::string& hash,
+// Throws Error(io) unless the file begins with the bytes that a run had written when it saved: otherwise it was edited, or is of
+// another run. A file that is shorter passes: a run that goes on from an earlier checkpoint cuts it. The message ends with
+// `cure`.
+void require_table_of_run(const std::filesystem::path& path, const FileDigest& saved,
                           std::string_view cure = {});
 
 // The cure where the run itself is called again.
@@ -72,14 +74,17 @@ class StatisticsFile {
     // Flushes: when it returns, all rows are in the file and on the device. Throws Error(io), also when the file was
     // removed or replaced; the file then ends with a whole row.
     void save();
+    // Size and checksum of what is in the file: of all rows after save().
+    FileDigest content() const { return {size_, digest_.hex()}; }
 
   private:
-    StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size);
+    StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size, Digest digest);
     void write_out();
 
     std::filesystem::path path_;
     Descriptor file_;
     std::uint64_t size_ = 0;  // bytes in the file
+    Digest digest_;           // of these
     std::string gathered_;    // rows that are not in the file yet
 };
 

@@ -63,6 +63,26 @@ Check check_numbers(const RunListing& run) {
         "frames", fmt::format("{} frames, {} to {}, no gap", numbers.size(), run.range.first_frame, last));
 }
 
+// The tables of a run that is not complete, to which it may have appended since.
+Check check_tables(const RunListing& run) {
+    Problems problems, unread;
+    std::uint64_t bytes = 0;
+    for (const FileRecord& table : run.tables) {
+        bytes += table.digest.bytes;
+        try {
+            if (!(file_digest(run.folder / table.path, table.digest.bytes) == table.digest))
+                problems.add(fmt::format("{}: does not begin with the {} bytes that were written", table.path,
+                                         table.digest.bytes));
+        } catch (const ReadFailure& failure) {
+            unread.add(failure.what());
+        } catch (const Error& error) {
+            problems.add(error.what());
+        }
+    }
+    if (problems.none() && !unread.none()) return unread.not_done("tables");
+    return problems.check("tables", fmt::format("begin with the {} bytes that were written", bytes));
+}
+
 // Returns the hashes of all steps that a run reports.
 std::vector<StateHash> hashes_of_steps(const RunListing& run) {
     std::vector<StateHash> hashes;
@@ -196,6 +216,7 @@ Verification verify_run(const std::filesystem::path& folder, const VerifyOptions
             {"digests", false, "the manifest, of an earlier version, has no checksums: run the scene anew"});
     for (Check& check : check_files(folder, files, extra_files(run, names)))
         result.checks.push_back(std::move(check));
+    if (!run.complete && !run.tables.empty()) result.checks.push_back(check_tables(run));
     if (options.against) result.checks.push_back(compare_runs(run, *options.against));
     if (!options.hashes_only) check_content(run, options, result.checks);
     if (options.replay > 0) result.checks.push_back(replay_frames(run, options.replay));

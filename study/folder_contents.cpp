@@ -13,19 +13,12 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/paths.h"
 
 namespace nephos {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Throws ReadFailure where the system cannot say.
-bool stands_there(const fs::path& path) {
-    std::error_code error;
-    const fs::file_type type = fs::symlink_status(path, error).type();
-    if (type == fs::file_type::none) throw ReadFailure(path, error.message(), "examine");
-    return type != fs::file_type::not_found;
-}
 
 // Returns nothing for what is no file: whatever it is, no sweep wrote it. Throws ReadFailure.
 std::string beginning_of(const fs::path& file, std::size_t most) {

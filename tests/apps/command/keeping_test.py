@@ -11,7 +11,7 @@ import time
 import unittest
 import zlib
 
-from case import Case, NEPHOS, SCENE
+from case import Case, NEPHOS, SCENE, unsealed
 
 LAYERED = """\
 name = "l"
@@ -88,7 +88,7 @@ class Keeping(Case):
         self.call("run", self.scene, "--statistics-only", "--seed", 5, "-q", "--out", "five", "--resume")
         shutil.copy(self.folder / "six/statistics.csv", self.folder / "five")
         self.kept("five", 3, "run", self.scene, "--statistics-only", "--seed", 5, "-q", "--out", "five", "--resume",
-                  says="the table is of another run")
+                  says="or is of another run")
         # What loses nothing goes on, also with more steps.
         self.call(*self.plain, "--out", "out", "--resume", "--set", "time.steps=9")
         self.call(*self.plain, "--out", "whole", "--set", "time.steps=9")
@@ -135,11 +135,33 @@ class Keeping(Case):
         shutil.copytree(self.folder / "a", self.folder / "mixed")
         shutil.copy(self.folder / "b/statistics.csv", self.folder / "mixed")
         self.kept("mixed", 3, "run", self.scene, "--seed", 3, *later, "--out", "mixed", "--resume",
-                  says="mixed/statistics.csv: step 6 has another state than in manifest.json: the table is of another run")
-        self.kept("mixed", 3, "run", "--from", "mixed", *later, "--out", "no", says="the table is of another run")
+                  says="mixed/statistics.csv: does not begin with the")
+        self.kept("mixed", 3, "run", "--from", "mixed", *later, "--out", "no", says="or is of another run")
         shutil.copy(self.folder / "a/checkpoint.nephos", self.folder / "b/early.nephos")
         self.kept("b", 3, "run", self.scene, "--seed", 3, "--from", "b/early.nephos", *later, "--out", "no",
                   says="b/early.nephos: is not of the run in the folder that it lies in")
+
+    def test_tables_that_were_edited(self):
+        """One digit of a row before the checkpoint, in the table of all and in that of a layer."""
+        layered = ("run", self.write("layered.toml", LAYERED), "-q")
+        self.call(*self.plain, "--out", "out")
+        self.call(*layered, "--out", "layers")
+        for folder, name, command in (("out", "statistics.csv", self.plain), ("layers", "statistics/low.csv", layered)):
+            more, table = ("--set", "time.steps=9"), self.folder / folder / name
+            whole = table.read_bytes()
+            at = whole.index(b"\n1,") + 3  # the time of step 1
+            table.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1:])
+            self.kept(folder, 3, *command, *more, "--out", folder, "--resume", says=f"{folder}/{name}: does not begin with the")
+            self.kept(folder, 3, "run", "--from", folder, *more, "-q", "--out", "no", says=f"{folder}/{name}: does not begin with the")
+            # Of a run that goes on, only what it had written is known.
+            manifest = self.folder / folder / "manifest.json"
+            complete = manifest.read_bytes()
+            manifest.write_text(unsealed({**json.loads(complete), "complete": False}))
+            self.assertIn("does not begin with the", self.call("verify", folder, status=1).stdout)
+            manifest.write_bytes(complete)
+            table.write_bytes(whole)
+            self.call(*command, *more, "--out", folder, "--resume")
+            self.call("verify", folder)
 
     def test_a_frame_that_is_not_what_was_written(self):
         self.call(*self.plain, "--out", "out")
