@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 
+#include <fmt/format.h>
 #include <malloc.h>
 
 #include "automaton/plane_bytes.h"
@@ -283,8 +284,8 @@ void Simulation::restore_history(const Checkpoint& checkpoint, Restart restart) 
     }
     // past() relies on these.
     const std::uint64_t lowest = lowest_needed();
-    const bool reaches_back =
-        !history_.empty() && history_.front().step <= (lowest > window() ? lowest - window() : 0);
+    const std::uint64_t needed = lowest > window() ? lowest - window() : 0;
+    const bool reaches_back = !history_.empty() && history_.front().step <= needed;
     bool good = reader.rest().empty() && !history_.empty() && next_step_ <= before.last_step + 1 &&
                 next_frame_ >= range_.first_frame &&
                 next_frame_ <= std::max(before.last_frame, before.first_frame - 1) + 1 &&
@@ -292,8 +293,14 @@ void Simulation::restore_history(const Checkpoint& checkpoint, Restart restart) 
     for (std::size_t n = 1; good && n < history_.size(); ++n)
         good = history_[n].step == history_[n - 1].step + 1;
     if (good && !reaches_back && !finished() && (before != range_ || restart == Restart::branch)) {
-        throw Error(ErrorCode::usage,
-                    "the checkpoint does not hold the states that further steps go on from: start anew");
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("the checkpoint holds the states from step {} on, but {} made of those from "
+                        "step {} on: expected {}",
+                        history_.front().step,
+                        lowest < next_step_ ? fmt::format("frame {} is", next_frame_) : "further steps are",
+                        needed,
+                        lowest < next_step_ ? "later frames (`frames.start_s`), or a new run" : "a new run"));
     }
     good = good && (finished() || reaches_back);
     if (!good) throw Error(ErrorCode::io, "the checkpoint's history is damaged");

@@ -83,7 +83,9 @@ std::string bash_command(const CLI::App& command) {
     out += fmt::format("            words='{}'\n", join(words, " "));
     for (const CLI::Option* option : options_of(command, true)) {
         if (value_of(*option) == Value::shell) out += "            positionals='bash zsh fish'\n";
-        if (value_of(*option) == Value::file) out += "            files=1\n";
+        if (value_of(*option) == Value::file) out += "            paths=-f\n";
+        if (value_of(*option) == Value::folder)
+            out += "            paths=${paths:--d}\n";  // files where either may stand
     }
     return out + "            ;;\n";
 }
@@ -98,7 +100,7 @@ std::string bash_script(const CLI::App& app) {
         "# bash completion for nephos; to use it: source <(nephos completion bash)\n"
         "_nephos() {\n"
         "    local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}\n"
-        "    local words= positionals= files= IFS=$' \\t\\n'\n"
+        "    local words= positionals= paths= IFS=$' \\t\\n'\n"
         "    COMPREPLY=()\n";
     out += fmt::format(
         "    if ((COMP_CWORD == 1)); then\n"
@@ -115,8 +117,8 @@ std::string bash_script(const CLI::App& app) {
         "        return\n"
         "    fi\n"
         "    COMPREPLY=($(compgen -W \"$positionals\" -- \"$current\"))\n"
-        "    if [[ $files ]]; then\n"
-        "        mapfile -t -O ${#COMPREPLY[@]} COMPREPLY < <(compgen -f -- \"$current\")\n"
+        "    if [[ $paths ]]; then\n"
+        "        mapfile -t -O ${#COMPREPLY[@]} COMPREPLY < <(compgen $paths -- \"$current\")\n"
         "    fi\n"
         "}\n"
         "complete -o filenames -F _nephos nephos\n";
