@@ -106,10 +106,9 @@ void check_frames(const SectionReader& reader, const Scene& scene) {
 
 // Sets a range that was not given to the lattice, as far as the keys go: the scene's text has it.
 void replace_infinite(Range& range, double low, double size) {
-    constexpr double kFarthest_m = 1e7;
     if (std::isinf(range.min))
-        range = {std::clamp(low, -kFarthest_m, kFarthest_m),
-                 std::clamp(low + size, -kFarthest_m, kFarthest_m)};
+        range = {std::clamp(low, -kFarthestPlace_m, kFarthestPlace_m),
+                 std::clamp(low + size, -kFarthestPlace_m, kFarthestPlace_m)};
 }
 
 }  // namespace

@@ -42,6 +42,10 @@ enum class KeyKind {
     tables,      // any number of tables, each described by Key::section    std::vector of owners
 };
 
+// Limits of what a scene places and of its times: beyond any weather on Earth, and about 30 years.
+inline constexpr double kFarthestPlace_m = 1e7;
+inline constexpr double kLongest_s = 1e9;
+
 // The valid numbers; also for each component of an extent, vector, colour or range.
 struct Limits {
     double min = -std::numeric_limits<double>::infinity();

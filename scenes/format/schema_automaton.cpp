@@ -29,9 +29,6 @@ const EllipsoidScatter& schema_build::default_element<EllipsoidScatter>() {
 
 namespace {
 
-constexpr double kFarthest_m = 1e7;  // beyond any weather on Earth
-constexpr double kLongest_s = 1e9;   // about 30 years
-
 const std::vector<std::string_view> kBoundaryWords{"open", "periodic"};
 
 void check_fades(const SectionReader& reader, double fades_s, double life_s) {
@@ -100,7 +97,7 @@ const Section& thermals_section() {
              "life_s", "s", above(0, kLongest_s),
              "Life of a thermal; at most the shortest of the plume. The last one dies with it."),
          key<&ThermalPlume::rise_m>(
-             "rise_m", "m", between(0, kFarthest_m),
+             "rise_m", "m", between(0, kFarthestPlace_m),
              "Height that a thermal gains in its life, drawn for each plume. It starts with twice "
              "its mean speed and comes to rest.",
              kBubbles),
@@ -129,11 +126,11 @@ const Section& ellipsoid_section() {
         "An ellipsoid placed by hand",
         "Parcels of humid air, placed by hand: inside, clouds are born and live longer. Of all that "
         "overlap, and of the background, the larger `hum` and `act` and the smaller `ext` count.",
-        {required(key<&Ellipsoid::centre_m>("centre_m", "m", between(-kFarthest_m, kFarthest_m),
+        {required(key<&Ellipsoid::centre_m>("centre_m", "m", between(-kFarthestPlace_m, kFarthestPlace_m),
                                             "Centre at its birth, or at time 0 if `birth_s` is below 0: "
                                             "east, north, height.",
                                             "D, control of motion")),
-         key<&Ellipsoid::semi_axes_m>("semi_axes_m", "m", above(0, kFarthest_m),
+         key<&Ellipsoid::semi_axes_m>("semi_axes_m", "m", above(0, kFarthestPlace_m),
                                       with_periodic_reach("Half of its length, width and height, before the "
                                                           "turn by `yaw_deg`.")),
          key<&Ellipsoid::yaw_deg>("yaw_deg", "deg", between(-360, 360),
@@ -168,21 +165,21 @@ const Section& scatter_section() {
         {required(key<&EllipsoidScatter::count>(
              "count", "", between(0, 100'000),
              "Their number: at any time with `replace`, otherwise in total.", "D, control of motion")),
-         default_is(key<&EllipsoidScatter::x_m>("x_m", "m", between(-kFarthest_m, kFarthest_m),
+         default_is(key<&EllipsoidScatter::x_m>("x_m", "m", between(-kFarthestPlace_m, kFarthestPlace_m),
                                                 "Where centres are drawn, east."),
                     "the whole lattice"),
-         default_is(key<&EllipsoidScatter::y_m>("y_m", "m", between(-kFarthest_m, kFarthest_m),
+         default_is(key<&EllipsoidScatter::y_m>("y_m", "m", between(-kFarthestPlace_m, kFarthestPlace_m),
                                                 "Where centres are drawn, north."),
                     "the whole lattice"),
-         default_is(key<&EllipsoidScatter::z_m>("z_m", "m", between(-kFarthest_m, kFarthest_m),
+         default_is(key<&EllipsoidScatter::z_m>("z_m", "m", between(-kFarthestPlace_m, kFarthestPlace_m),
                                                 "Where centres are drawn, height."),
                     "the whole lattice"),
          key<&EllipsoidScatter::semi_axis_x_m>(
-             "semi_axis_x_m", "m", above(0, kFarthest_m),
+             "semi_axis_x_m", "m", above(0, kFarthestPlace_m),
              with_periodic_reach("Half of the length, before the turn by `yaw_deg`.")),
-         key<&EllipsoidScatter::semi_axis_y_m>("semi_axis_y_m", "m", above(0, kFarthest_m),
+         key<&EllipsoidScatter::semi_axis_y_m>("semi_axis_y_m", "m", above(0, kFarthestPlace_m),
                                                with_periodic_reach("Half of the width.")),
-         key<&EllipsoidScatter::semi_axis_z_m>("semi_axis_z_m", "m", above(0, kFarthest_m),
+         key<&EllipsoidScatter::semi_axis_z_m>("semi_axis_z_m", "m", above(0, kFarthestPlace_m),
                                                with_periodic_reach("Half of the height.")),
          key<&EllipsoidScatter::yaw_deg>("yaw_deg", "deg", between(-360, 360),
                                          "Turn about the vertical, counter-clockwise seen from above."),
@@ -226,18 +223,19 @@ const Section& probabilities_section() {
 namespace {
 
 const Section& background_level_section() {
-    static const Section section{
-        "A level of the background",
-        "The background at a height; between levels it is linear, below the first and above the last constant.",
-        {required(key<&BackgroundLevel::height_m>("height_m", "m", between(-kFarthest_m, kFarthest_m),
-                                                  "Height of the world; levels rise.")),
-         key<&BackgroundLevel::background, &Probabilities::hum>("hum", "per step", between(0, 1),
-                                                                "As `field.background.hum`, there."),
-         key<&BackgroundLevel::background, &Probabilities::act>("act", "per step", between(0, 1),
-                                                                "As `field.background.act`, there."),
-         key<&BackgroundLevel::background, &Probabilities::ext>("ext", "per step", between(0, 1),
-                                                                "As `field.background.ext`, there.")},
-        nullptr};
+    static const Section section{"A level of the background",
+                                 "The background at a height; between levels it is linear, below the first "
+                                 "and above the last constant.",
+                                 {required(key<&BackgroundLevel::height_m>(
+                                      "height_m", "m", between(-kFarthestPlace_m, kFarthestPlace_m),
+                                      "Height of the world; levels rise.")),
+                                  key<&BackgroundLevel::background, &Probabilities::hum>(
+                                      "hum", "per step", between(0, 1), "As `field.background.hum`, there."),
+                                  key<&BackgroundLevel::background, &Probabilities::act>(
+                                      "act", "per step", between(0, 1), "As `field.background.act`, there."),
+                                  key<&BackgroundLevel::background, &Probabilities::ext>(
+                                      "ext", "per step", between(0, 1), "As `field.background.ext`, there.")},
+                                 nullptr};
     return section;
 }
 
@@ -343,7 +341,7 @@ const Section& lattice_section() {
          key<&Scene::automaton, &AutomatonOptions::placement, &Placement::cell_size_m>(
              "cell_size_m", "m", between(0.01, 1e5), "Edge of a cubic cell."),
          key<&Scene::automaton, &AutomatonOptions::placement, &Placement::origin_m>(
-             "origin_m", "m", between(-kFarthest_m, kFarthest_m),
+             "origin_m", "m", between(-kFarthestPlace_m, kFarthestPlace_m),
              "Where the lower south-west corner of the box stands; its third number is the height of the "
              "lowest clouds."),
          boundaries,

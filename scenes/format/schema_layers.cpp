@@ -18,8 +18,6 @@ const EllipsoidScatter& schema_build::default_element<EllipsoidScatter>();
 
 namespace {
 
-constexpr double kFarthest_m = 1e7;
-constexpr double kLongest_s = 1e9;
 constexpr Limits kIntensity = between(0, 500);
 
 const char* const kCentreEffect = "Probabilities at the centre, as `[field.background]`.";
@@ -115,16 +113,17 @@ const Section& layer_lattice_section() {
                         "cell_size_m", "m", between(0.01, 1e5), "Edge of a cubic cell."),
                     same),
          default_is(key<&LayerOptions::placement, &Placement::origin_m>(
-                        "origin_m", "m", between(-kFarthest_m, kFarthest_m),
+                        "origin_m", "m", between(-kFarthestPlace_m, kFarthestPlace_m),
                         "Where the lower south-west corner of the box stands."),
                     same),
          written_if(&of_clouds, default_is(boundaries, same)),
-         default_is(key<&LayerOptions::initial_state_file>(
-                        "initial_state", "", kAny,
-                        "A VDB file whose bool grids `hum`, `act` and `cld` are the start of this layer (`nephos "
-                        "state --layer` writes one); relative to the scene's folder. Its cells, their size and its "
-                        "place are those of the layer's lattice."),
-                    "none: by `lattice.initial`")},
+         default_is(
+             key<&LayerOptions::initial_state_file>(
+                 "initial_state", "", kAny,
+                 "A VDB file whose bool grids `hum`, `act` and `cld` are the start of this layer (`nephos "
+                 "state --layer` writes one); relative to the scene's folder. Its cells, their size and its "
+                 "place are those of the layer's lattice."),
+             "none: by `lattice.initial`")},
         nullptr};
     return section;
 }
@@ -188,15 +187,15 @@ void finish_placed(const SectionReader& reader, void* owner) {
 }
 
 const Section& placed_section() {
-    constexpr Limits kPlace = between(-kFarthest_m, kFarthest_m);
+    constexpr Limits kPlace = between(-kFarthestPlace_m, kFarthestPlace_m);
     static const Section section{
         "Rain placed by hand",
         "Ellipses on the ground in which it rains.",
         {required(key<&PlacedRain::x_m>("x_m", "m", kPlace, "Centre at time 0, east.", "P")),
          required(key<&PlacedRain::y_m>("y_m", "m", kPlace, "Centre at time 0, north.", "P")),
-         key<&PlacedRain::semi_a_m>("semi_a_m", "m", above(0, kFarthest_m), "Semi-axis along `yaw_deg`.",
+         key<&PlacedRain::semi_a_m>("semi_a_m", "m", above(0, kFarthestPlace_m), "Semi-axis along `yaw_deg`.",
                                     "P"),
-         key<&PlacedRain::semi_b_m>("semi_b_m", "m", above(0, kFarthest_m), "Semi-axis across it.", "P"),
+         key<&PlacedRain::semi_b_m>("semi_b_m", "m", above(0, kFarthestPlace_m), "Semi-axis across it.", "P"),
          key<&PlacedRain::yaw_deg>("yaw_deg", "deg", between(-360, 360),
                                    "Direction of the first axis, counter-clockwise from east."),
          key<&PlacedRain::intensity_mm_per_h>("intensity_mm_per_h", "mm/h", kIntensity,
@@ -290,7 +289,7 @@ const Section& presence_section() {
 }
 
 const Section& column_section() {
-    constexpr Limits kHeight = between(-kFarthest_m, kFarthest_m);
+    constexpr Limits kHeight = between(-kFarthestPlace_m, kFarthestPlace_m);
     static const Section section{
         "Humid column",
         "The air above a rain area: humid, so that its cloud lives longer.",

@@ -12,7 +12,6 @@ using namespace schema_build;
 
 namespace {
 
-constexpr double kFarthest_m = 1e7;
 constexpr Limits kLight = between(0, 1000);
 
 template <auto... Members>
@@ -191,7 +190,7 @@ const Section& frames_section() {
 
 const Section& camera_section() {
     constexpr Limits kPixels = between(1, 16'384);
-    constexpr Limits kWorld = between(-kFarthest_m, kFarthest_m);
+    constexpr Limits kWorld = between(-kFarthestPlace_m, kFarthestPlace_m);
     static const Section section{
         "Camera",
         "A perspective camera; height is up in the picture.",
@@ -292,7 +291,7 @@ const Section& sun_section() {
 }
 
 const Section& lightning_section() {
-    constexpr Limits kWorld = between(-kFarthest_m, kFarthest_m);
+    constexpr Limits kWorld = between(-kFarthestPlace_m, kFarthestPlace_m);
     static const Section section{
         "Lightning",
         "Flashes that light clouds and ground from their place. A flash is brightest when it begins and "

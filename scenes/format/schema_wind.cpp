@@ -24,8 +24,6 @@ const WindField& schema_build::default_element<WindField>() {
 
 namespace {
 
-constexpr double kFarthest_m = 1e7;  // beyond any weather on Earth
-constexpr double kLongest_s = 1e9;   // about 30 years
 constexpr double kFastest_m_per_s = 1000;
 
 }  // namespace
@@ -62,8 +60,9 @@ const Section& level_section() {
         "The wind at a height, by its components or as pilots say it; between levels it is linear, below the "
         "first "
         "and above the last constant.",
-        {required(key<&WindLevel::height_m>("height_m", "m", between(-kFarthest_m, kFarthest_m),
-                                            "Height of the world, as `ground.height_m` is; levels rise.", "D, advection")),
+        {required(key<&WindLevel::height_m>("height_m", "m", between(-kFarthestPlace_m, kFarthestPlace_m),
+                                            "Height of the world, as `ground.height_m` is; levels rise.",
+                                            "D, advection")),
          key<&WindLevel::velocity, &Velocity::east_m_per_s>("east_m_per_s", "m/s", kSpeed,
                                                             "Velocity towards east."),
          key<&WindLevel::velocity, &Velocity::north_m_per_s>("north_m_per_s", "m/s", kSpeed,
@@ -144,7 +143,7 @@ void finish_wind_field(const SectionReader& reader, void* owner) {
 
 const Section& wind_field_section() {
     constexpr const char* kFields = "D, vector fields";
-    constexpr Limits kPlace = between(-kFarthest_m, kFarthest_m);
+    constexpr Limits kPlace = between(-kFarthestPlace_m, kFarthestPlace_m);
     constexpr auto of_grid = [](const void* field) {
         return static_cast<const WindField*>(field)->kind == WindFieldKind::grid;
     };
@@ -157,28 +156,35 @@ const Section& wind_field_section() {
     };
     static const Section section{
         "Wind fields",
-        "Wind that differs from place to place, added to the profile of `[[wind]]` in every layer: circulations in a "
-        "formula, none of which has divergence, or velocities from VDB files. Cells, ellipsoids and the clouds of skies "
+        "Wind that differs from place to place, added to the profile of `[[wind]]` in every layer: "
+        "circulations in a "
+        "formula, none of which has divergence, or velocities from VDB files. Cells, ellipsoids and the "
+        "clouds of skies "
         "move with it; the velocity grid of files has it.",
-        {required(word<&WindField::kind>(
-             "kind", {"thermal", "roll", "shear_line", "vortex", "grid"},
-             "\"thermal\": a rising core in a ring of sinking air. \"roll\": rolls side by side, alternately rising "
-             "and sinking. \"shear_line\": two streams of opposite directions beside each other. \"vortex\": a solid "
-             "turning core, and outside of it 1/r. \"grid\": from `files`.",
-             kFields)),
-         written_if(key<&WindField::x_m>("x_m", "m", kPlace, "A place on its axis or line, east.", kFields), analytic),
+        {required(word<&WindField::kind>("kind", {"thermal", "roll", "shear_line", "vortex", "grid"},
+                                         "\"thermal\": a rising core in a ring of sinking air. \"roll\": "
+                                         "rolls side by side, alternately rising "
+                                         "and sinking. \"shear_line\": two streams of opposite directions "
+                                         "beside each other. \"vortex\": a solid "
+                                         "turning core, and outside of it 1/r. \"grid\": from `files`.",
+                                         kFields)),
+         written_if(key<&WindField::x_m>("x_m", "m", kPlace, "A place on its axis or line, east.", kFields),
+                    analytic),
          written_if(key<&WindField::y_m>("y_m", "m", kPlace, "The same, north.", kFields), analytic),
-         written_if(key<&WindField::radius_m>("radius_m", "m", above(0, kFarthest_m),
-                                              "Of a thermal with its ring; of a vortex' core; half the width of a shear "
-                                              "line; from rising to sinking air of rolls."),
+         written_if(key<&WindField::radius_m>(
+                        "radius_m", "m", above(0, kFarthestPlace_m),
+                        "Of a thermal with its ring; of a vortex' core; half the width of a shear "
+                        "line; from rising to sinking air of rolls."),
                     analytic),
-         written_if(key<&WindField::speed_m_per_s>(
-                        "speed_m_per_s", "m/s", between(-kFastest_m_per_s, kFastest_m_per_s),
-                        "The largest: upwards in a thermal or roll, at the core's edge of a vortex, counter-clockwise, "
-                        "along the left side of a shear line."),
+         written_if(key<&WindField::speed_m_per_s>("speed_m_per_s", "m/s",
+                                                   between(-kFastest_m_per_s, kFastest_m_per_s),
+                                                   "The largest: upwards in a thermal or roll, at the core's "
+                                                   "edge of a vortex, counter-clockwise, "
+                                                   "along the left side of a shear line."),
                     analytic),
-         written_if(key<&WindField::direction_deg>("direction_deg", "deg", between(-360, 360),
-                                                   "Of rolls and shear lines: along them, counter-clockwise from east."),
+         written_if(key<&WindField::direction_deg>(
+                        "direction_deg", "deg", between(-360, 360),
+                        "Of rolls and shear lines: along them, counter-clockwise from east."),
                     directed),
          written_if(default_is(key<&WindField::bottom_m>("bottom_m", "m", kPlace,
                                                          "Height below which there is none of it."),
@@ -188,16 +194,18 @@ const Section& wind_field_section() {
                                                       "Height above which there is none of it."),
                                "the top of `[lattice]`"),
                     analytic),
-         written_if(default_is(key<&WindField::files>(
-                                   "files", "", kAny,
-                                   "VDB files with the velocity in m/s of world space, one after the other in time; "
-                                   "relative to the scene's folder. Between points and between times it is linear, "
-                                   "beyond them constant.",
-                                   kFields),
-                               "required with kind = \"grid\""),
-                    of_grid),
-         written_if(default_is(key<&WindField::grid>("grid", "", kAny, "Name of their vec3s grid."), "the only one"),
-                    of_grid),
+         written_if(
+             default_is(key<&WindField::files>(
+                            "files", "", kAny,
+                            "VDB files with the velocity in m/s of world space, one after the other in time; "
+                            "relative to the scene's folder. Between points and between times it is linear, "
+                            "beyond them constant.",
+                            kFields),
+                        "required with kind = \"grid\""),
+             of_grid),
+         written_if(
+             default_is(key<&WindField::grid>("grid", "", kAny, "Name of their vec3s grid."), "the only one"),
+             of_grid),
          written_if(key<&WindField::start_s>("start_s", "s", between(-kLongest_s, kLongest_s),
                                              "Simulated time of the first file."),
                     of_grid),
