@@ -128,38 +128,43 @@ std::uint64_t point_count(const SweepOptions& options) {
 }
 
 void check_options(const SweepOptions& options) {
-    const auto fail = [](const std::string& message) { throw Error(ErrorCode::usage, message); };
+    const PlanPlaces& places = options.places;
+    const auto fail = [&](PlanPlace place, const std::string& message) { fail_at(options, place, message); };
     constexpr std::uint64_t kLargestSeed =
         std::numeric_limits<std::int64_t>::max();  // of the sweep's own file
     if (options.seed > kLargestSeed)
-        fail(fmt::format("seed: {} is not from 0 to {}", options.seed, kLargestSeed));
+        fail({}, fmt::format("seed: {} is not from 0 to {}", options.seed, kLargestSeed));
     if (options.replicates < 1 || options.replicates > 100'000)
-        fail(fmt::format("replicates: {} is not from 1 to 100,000", options.replicates));
+        fail({}, fmt::format("replicates: {} is not from 1 to 100,000", options.replicates));
     if (options.steps.min < 20 || options.steps.max < options.steps.min || options.steps.max > kMaxSteps)
-        fail(fmt::format("steps: {}..{} is not a range from 20 steps upwards", options.steps.min,
-                         options.steps.max));
+        fail({}, fmt::format("steps: {}..{} is not a range from 20 steps upwards", options.steps.min,
+                             options.steps.max));
     if (is_sampled(options.design) && options.axes.empty())
-        fail(fmt::format("design '{}': has no axis to take points from: expected --axis KEY=FROM..TO",
+        fail(places.design,
+             fmt::format("design '{}': has no axis to take points from: expected --axis KEY=FROM..TO",
                          design_name(options.design)));
     if (!is_sampled(options.design) && options.points > 0)
-        fail(fmt::format(
-            "points: a design '{}' has the points of its values: expected no number of points, or a "
-            "sampled design",
-            design_name(options.design)));
+        fail(places.points,
+             fmt::format(
+                 "points: a design '{}' has the points of its values: expected no number of points, or a "
+                 "sampled design",
+                 design_name(options.design)));
     if (options.steps.until && options.clouds_every == 0 && is_of_snapshots(options.steps.until->statistic))
-        fail(fmt::format(
-            "until: `{}` is of snapshots, and clouds_every = 0 takes none: expected another statistic, or "
-            "--clouds-every N",
-            options.steps.until->statistic));
+        fail(places.until, fmt::format("until: `{}` is of snapshots, and clouds_every = 0 takes none: "
+                                       "expected another statistic, or "
+                                       "--clouds-every N",
+                                       options.steps.until->statistic));
     for (const Axis& axis : options.axes) {
         require_keys(options, axis);
         require_values(options, axis);
     }
     require_apart(options);
     if (is_sampled(options.design) && (options.points < 1 || options.points > kMaxPoints))
-        fail(fmt::format("design '{}': expected points from 1 to {}", design_name(options.design),
+        fail(places.points.line > 0 ? places.points : places.design,
+             fmt::format("design '{}': expected points from 1 to {}", design_name(options.design),
                          kMaxPoints));
-    if (point_count(options) > kMaxPoints) fail(fmt::format("the grid has more than {} points", kMaxPoints));
+    if (point_count(options) > kMaxPoints)
+        fail({}, fmt::format("the grid has more than {} points", kMaxPoints));
 }
 
 }  // namespace nephos

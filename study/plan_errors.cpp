@@ -32,7 +32,8 @@ struct PlacedOption {
 std::vector<PlacedOption> placed_options(const SweepOptions& options, const std::vector<ValueInUse>& values) {
     std::vector<PlacedOption> all;
     for (std::size_t n = 0; n < options.overrides.size(); ++n) {
-        const PlanPlace place = n < options.override_places.size() ? options.override_places[n] : PlanPlace{};
+        const PlanPlace place =
+            n < options.places.overrides.size() ? options.places.overrides[n] : PlanPlace{};
         all.push_back({option_label(options.overrides[n]), 0, place, place});
     }
     for (const ValueInUse& one : values) {

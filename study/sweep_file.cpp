@@ -172,7 +172,13 @@ SweepOptions read_sweep_text(std::string text, const std::filesystem::path& path
             table.report("scene", "`scene` names no file", "expected scene = \"FILE.toml\"");
         options.scene_file = path.parent_path() / scene.value_or("");
         options.overrides = table.texts("set");
-        options.override_places = places_in(table, "set");
+        options.places = {places_in(table, "set"),
+                          place_in(table, "scene"),
+                          place_in(table, "design"),
+                          place_in(table, "points"),
+                          {},
+                          place_in(table, "layer"),
+                          place_in(table, "tracks")};
         options.design = Design(table.word("design", {"grid", "list", "random", "latin_hypercube", "sobol"})
                                     .value_or(std::size_t(Design::grid)));
         options.points = table.integer("points", 1, 10'000'000).value_or(0);
@@ -185,9 +191,10 @@ SweepOptions read_sweep_text(std::string text, const std::filesystem::path& path
             int(table.integer("clouds_every", 0, 1'000'000).value_or(std::uint64_t(options.clouds_every)));
         options.tracks = table.flag("tracks").value_or(false);
         options.layer = table.text("layer").value_or("");
-        options.layer_place = place_in(table, "layer");
-        options.tracks_place = place_in(table, "tracks");
-        table.table("steps", [&](TomlTable& steps) { read_steps(steps, options.steps); });
+        table.table("steps", [&](TomlTable& steps) {
+            options.places.until = place_in(steps, "until");
+            read_steps(steps, options.steps);
+        });
         const std::optional<std::string> place = table.text("folder");
         if (place && names_no_file(*place))
             table.report("folder", "`folder` names no folder", "expected that of files among the values");

@@ -19,6 +19,7 @@
 #include <fmt/format.h>
 
 #include "automaton/checkpoint.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/math.h"
 #include "core/random.h"
@@ -58,16 +59,18 @@ void require_same_wind(const Scene& scene, std::size_t lattice) {
                     "same all over each level: leave out --tracks");
 }
 
-// Calls `check`; an error of usage without a place gets one, where that is known, and words before it.
+// Calls `check`; an error without a place gets one, where that is known, and words before it. A failure of reading keeps its
+// own.
 void with_place(const SweepOptions& options, PlanPlace place, const std::string& before,
                 const std::function<void()>& check) {
     try {
         check();
     } catch (const SceneErrors&) {
         throw;
+    } catch (const ReadFailure&) {
+        throw;
     } catch (const Error& error) {
-        if (error.code() != ErrorCode::usage) throw;
-        fail_at(options, place, before + error.what());
+        fail_at(options, place, before + error.what(), error.code());
     }
 }
 
@@ -91,7 +94,9 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
         for (std::string& value : axis.values) value = canonical_value(value, of_text);
     }
     check_options(options_);
-    if (!options_.source) options_.source.emplace(options_.scene_file);
+    if (!options_.source)
+        with_place(options_, options_.places.scene, "",
+                   [&] { options_.source.emplace(options_.scene_file); });
     read_placed(options_, {}, [&] {
         scene_ = options_.source->read(options_.overrides, SceneUse::without_frames);
         stamps_ = stamps_of(scene_, {FileKind::first_state, FileKind::simulation});
@@ -101,10 +106,10 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
         return place.line > 0 ? "" : options_.scene_file.string() + ": ";
     };
     std::size_t measured = 0;
-    with_place(options_, options_.layer_place, of_scene(options_.layer_place),
+    with_place(options_, options_.places.layer, of_scene(options_.places.layer),
                [&] { measured = measured_lattice(scene_, options_.layer); });
     if (options_.tracks)
-        with_place(options_, options_.tracks_place, of_scene(options_.tracks_place),
+        with_place(options_, options_.places.tracks, of_scene(options_.places.tracks),
                    [&] { require_same_wind(scene_, measured); });
     if (!scene_.layers.empty()) options_.layer = scene_.layers[measured].name;
     lattice_ = automaton_options(scene_, measured);

@@ -47,6 +47,12 @@ struct AxisPlaces {
     bool operator==(const AxisPlaces&) const { return true; }
 };
 
+// Where the other keys of a plan stand, of which its checks say what is wrong.
+struct PlanPlaces {
+    std::vector<PlanPlace> overrides;  // the first ones of the plan, those of the file
+    PlanPlace scene, design, points, until, layer, tracks;
+};
+
 // The file of a plan, that messages quote.
 struct PlanFile {
     std::string label, text;
@@ -93,9 +99,8 @@ struct SweepOptions {
     int clouds_every = 10;  // steps between the snapshots whose clouds are labelled; 0: none
     bool tracks = false;    // clouds are followed from step to step (statistics/tracks.h)
     std::string layer;      // whose statistics are taken; empty: the only lattice of the scene
-    std::shared_ptr<const PlanFile> file = {};    // that the places are of; null: none
-    std::vector<PlanPlace> override_places = {};  // of the first overrides, those of the file
-    PlanPlace layer_place = {}, tracks_place = {};
+    std::shared_ptr<const PlanFile> file = {};  // that the places are of; null: none
+    PlanPlaces places = {};
 };
 
 // One run, as its worker needs it.

@@ -79,8 +79,14 @@ SweepOptions options_of(const SweepArguments& a) {
     }
     options.overrides.insert(options.overrides.end(), a.scene.overrides.begin(), a.scene.overrides.end());
     for (const std::string& axis : a.axes) options.axes.push_back(parse_axis(axis));
-    if (a.design) options.design = *a.design;
-    if (a.points) options.points = *a.points;
+    if (a.design) {
+        options.design = *a.design;
+        options.places.design = {};
+    }
+    if (a.points) {
+        options.points = *a.points;
+        options.places.points = {};
+    }
     if (a.points && !a.design && options.design == Design::grid) {
         for (const Axis& axis : options.axes)
             if (!axis.values.empty())
@@ -94,15 +100,18 @@ SweepOptions options_of(const SweepArguments& a) {
     if (a.scene.seed) options.seed = *a.scene.seed;
     if (a.common_seeds) options.common_seeds = true;
     if (a.steps) options.steps = {a.steps->first, a.steps->second, options.steps.until};
-    if (a.until) options.steps.until = a.until;
+    if (a.until) {
+        options.steps.until = a.until;
+        options.places.until = {};
+    }
     if (a.clouds_every) options.clouds_every = int(*a.clouds_every);
     if (a.tracks) {
         options.tracks = true;
-        options.tracks_place = {};
+        options.places.tracks = {};
     }
     if (!a.layer.empty()) {
         options.layer = a.layer;
-        options.layer_place = {};
+        options.places.layer = {};
     }
     return options;
 }
