@@ -172,13 +172,37 @@ EncodedVolume read_vti(const std::filesystem::path& path) {
     });
 }
 
+namespace {
+
+std::string xml_attribute(std::string_view text) {
+    std::string out;
+    for (const char c : text) {
+        switch (c) {
+            case '&':
+                out += "&amp;";
+                break;
+            case '<':
+                out += "&lt;";
+                break;
+            case '"':
+                out += "&quot;";
+                break;
+            default:
+                out += c;
+        }
+    }
+    return out;
+}
+
+}  // namespace
+
 std::string pvd_text(const std::vector<PvdEntry>& entries) {
     std::string text =
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" "
         "byte_order=\"LittleEndian\">\n<Collection>\n";
     for (const PvdEntry& entry : entries)
         text += "<DataSet timestep=\"" + number_text(entry.time_s) + "\" group=\"\" part=\"0\" file=\"" +
-                entry.file + "\"/>\n";
+                xml_attribute(entry.file) + "\"/>\n";
     return text + "</Collection>\n</VTKFile>\n";
 }
 

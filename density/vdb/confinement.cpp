@@ -51,7 +51,8 @@ std::size_t address_space() {
 }
 
 [[noreturn]] void fail(const std::string& step, int number) {
-    throw std::runtime_error("cannot confine the process that reads it: " + step + ": " + std::strerror(number));
+    throw std::runtime_error("cannot read: the process that does it cannot be confined: " + step + ": " +
+                             std::strerror(number));
 }
 
 // The soft limit is `value`, the hard one `grace` above it.

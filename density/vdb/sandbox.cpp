@@ -37,7 +37,34 @@ constexpr std::size_t kChunk = std::size_t{1} << 18;
 constexpr std::size_t kMaxText = std::size_t{1} << 16;
 constexpr int kMaxAttempts = 3;
 constexpr auto kStallTime = std::chrono::seconds(8);
-constexpr const char* kTooLong = "reading it takes longer than allowed";
+// Begins a message that says nothing of what is in the file: of the system, or of limits.
+constexpr std::string_view kCannotRead = "cannot read: ";
+constexpr const char* kTooLong = "cannot read: it takes longer than allowed";
+
+// The time that reading may take. It is asked twice a second while the child is waited for: where much more has passed between
+// two looks, this process was stopped (Ctrl-Z, a batch system), and the child with it or for want of a reader. That is
+// not the child's time.
+class TimeAllowed {
+  public:
+    explicit TimeAllowed(double seconds)
+        : left_(std::chrono::milliseconds(static_cast<long long>(seconds * 1000))) {}
+
+    // Takes off what has passed since the last look.
+    void count() {
+        const Clock::time_point now = Clock::now();
+        left_ -= std::min<Clock::duration>(now - looked_, kLongestLook);
+        looked_ = now;
+    }
+    // A look that takes nothing off.
+    void skip() { looked_ = Clock::now(); }
+    Clock::duration left() const { return left_; }
+    bool is_over() const { return left_ <= Clock::duration::zero(); }
+
+  private:
+    static constexpr auto kLongestLook = std::chrono::seconds(2);
+    Clock::duration left_;
+    Clock::time_point looked_ = Clock::now();
+};
 
 // Thrown inside run_sandboxed when the child seems to wait for a lock that nobody holds.
 struct Stalled {};
@@ -85,12 +112,12 @@ std::pair<char, long> process_state(pid_t pid) {
 
 class PipeReader final : public SandboxReader {
   public:
-    PipeReader(int fd, pid_t pid, const SandboxLimits& limits, Clock::time_point deadline, bool last_attempt)
+    PipeReader(int fd, pid_t pid, const SandboxLimits& limits, TimeAllowed& time, bool last_attempt)
         : fd_(fd),
           pid_(pid),
           memory_(limits.memory_bytes),
           most_(limits.most_bytes),
-          deadline_(deadline),
+          time_(time),
           watch_for_stall_(!last_attempt),
           quiet_since_(Clock::now()) {}
 
@@ -107,9 +134,6 @@ class PipeReader final : public SandboxReader {
     }
 
     std::size_t memory_bytes() const override { return memory_; }
-
-    // Returns when the child must have ended.
-    Clock::time_point deadline() const { return deadline_; }
 
     void expect_end() {
         std::uint32_t length = 0;
@@ -153,10 +177,10 @@ class PipeReader final : public SandboxReader {
 
     // Reads what has come: values of a few bytes one by one would cost two system calls each.
     void refill() {
-        deadline_ +=
-            Clock::now() - arrival_;  // what the caller did with the last of it is not the child's time
+        time_.skip();  // what the caller did with the last of it is not the child's time
         for (;;) {
             wait_for_data();
+            time_.count();
             const ssize_t got = ::read(fd_, buffer_.data(), buffer_.size());
             if (got < 0 && errno == EINTR) continue;
             if (got < 0)
@@ -166,17 +190,15 @@ class PipeReader final : public SandboxReader {
             watch_for_stall_ = false;
             at_ = 0;
             arrived_ = std::size_t(got);
-            arrival_ = Clock::now();
             return;
         }
     }
 
     void wait_for_data() {
         for (;;) {
-            const auto now = Clock::now();
-            if (now >= deadline_) throw std::runtime_error(kTooLong);
-            const auto left =
-                std::chrono::duration_cast<std::chrono::milliseconds>(deadline_ - now).count() + 1;
+            time_.count();
+            if (time_.is_over()) throw std::runtime_error(kTooLong);
+            const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(time_.left()).count() + 1;
             pollfd poll_fd{fd_, POLLIN, 0};
             const int ready = ::poll(&poll_fd, 1, int(std::min<long long>(left, 500)));
             if (ready > 0) return;
@@ -198,7 +220,7 @@ class PipeReader final : public SandboxReader {
     pid_t pid_;
     std::size_t memory_;
     std::size_t most_;  // bytes that may still come
-    Clock::time_point deadline_, arrival_ = Clock::now();
+    TimeAllowed& time_;
     bool watch_for_stall_;
     Clock::time_point quiet_since_;
     long used_ = -1;
@@ -221,11 +243,12 @@ class Child {
         has_ended(0);
     }
 
-    // Waits for its end, which it may put off for ever, and kills it at the deadline. Returns how it ended, in words, ""
-    // when as it should.
-    std::string end_by(Clock::time_point deadline) {
+    // Waits for its end, which it may put off for ever, and kills it when its time is over. Returns how it ended, in words,
+    // "" when as it should.
+    std::string end_within(TimeAllowed& time) {
         while (!has_ended(WNOHANG)) {
-            if (Clock::now() >= deadline) {
+            time.count();
+            if (time.is_over()) {
                 kill();
                 return kTooLong;
             }
@@ -246,20 +269,18 @@ class Child {
         return true;
     }
 
+    // None of it is a verdict: a parser that stumbles over damage and one that is refused memory end alike.
     std::string how_it_ended() const {
         const int status = status_;
         if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return "";
         if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) return kTooLong;
+        const std::string begin(kCannotRead);
         // The system's answer to memory that is short, in the machine or in a control group.
         if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
-            return "the system killed the process that read it, as it does where memory is short";
-        if (WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT)
-            return parser_ + " ended with signal 6 while reading it: it is damaged, or memory is short";
-        if (WIFSIGNALED(status)) {
-            return "it is damaged: " + parser_ + " ended with signal " + std::to_string(WTERMSIG(status)) +
-                   " while reading it";
-        }
-        return "it is damaged: " + parser_ + " ended while reading it";
+            return begin + "the system killed the process that read it, as it does where memory is short";
+        const std::string how =
+            WIFSIGNALED(status) ? " ended with signal " + std::to_string(WTERMSIG(status)) : " ended";
+        return begin + parser_ + how + ": the file is damaged, or memory is short";
     }
 
     pid_t pid_;
@@ -267,11 +288,8 @@ class Child {
     std::string parser_;
 };
 
-// Begins a message of the system, which says nothing of what is in the file.
-constexpr std::string_view kCannotRead = "cannot read: ";
-
-void attempt(std::string_view parser, const SandboxLimits& limits, std::span<const int> kept, Clock::time_point deadline,
-             bool last_attempt, const std::function<void(SandboxWriter&)>& child,
+void attempt(std::string_view parser, const SandboxLimits& limits, std::span<const int> kept,
+             TimeAllowed& time, bool last_attempt, const std::function<void(SandboxWriter&)>& child,
              const std::function<void(SandboxReader&)>& parent) {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) {
@@ -287,13 +305,13 @@ void attempt(std::string_view parser, const SandboxLimits& limits, std::span<con
     if (pid == 0) run_child(self, ends[1], limits, kept, child);
     in.close();
     Child process(pid, parser);
-    PipeReader reader(out.get(), pid, limits, deadline, last_attempt);
+    PipeReader reader(out.get(), pid, limits, time, last_attempt);
     try {
         parent(reader);
         reader.expect_end();
     } catch (const std::runtime_error& error) {
         if (*error.what() != '\0') throw;
-        const std::string how = process.end_by(reader.deadline());
+        const std::string how = process.end_within(time);
         throw std::runtime_error(how.empty() ? "the reading process ended early" : how);
     }
     process.kill();  // all has come: there is nothing to wait for
@@ -348,7 +366,7 @@ std::string SandboxReader::text() {
 }
 
 std::string too_large(std::size_t memory_bytes) {
-    return "reading it takes more than the " + std::to_string(memory_bytes >> 20) +
+    return std::string(kCannotRead) + "it takes more than the " + std::to_string(memory_bytes >> 20) +
            " MiB of memory that are allowed";
 }
 
@@ -369,11 +387,10 @@ void run_sandboxed(const std::filesystem::path& subject, std::string_view parser
         throw Error(ErrorCode::usage,
                     "time limit of " + number_text(limits.seconds, 6) + " s: must be above 0");
     }
-    const auto deadline =
-        Clock::now() + std::chrono::milliseconds(static_cast<long long>(limits.seconds * 1000));
+    TimeAllowed time(limits.seconds);
     for (int n = 1; n <= kMaxAttempts; ++n) {
         try {
-            attempt(parser, limits, kept, deadline, n == kMaxAttempts, child, parent);
+            attempt(parser, limits, kept, time, n == kMaxAttempts, child, parent);
             return;
         } catch (const Stalled&) {
         } catch (const Error&) {

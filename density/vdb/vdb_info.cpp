@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "density/vdb/serial_tree.h"
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_metadata.h"
@@ -100,7 +101,8 @@ void send_size(VdbArchive& archive, std::size_t n, SandboxWriter& writer) {
         voxels = std::uint64_t(*stated);
     } else {
         const auto grid = archive.read(n);
-        voxels = grid->activeVoxelCount();
+        const auto count = [&](const auto& typed) { voxels = count_active(typed.tree()); };
+        if (!grid->apply<openvdb::GridTypes>(count)) voxels = grid->activeVoxelCount();
         const openvdb::CoordBBox active = grid->evalActiveVoxelBoundingBox();
         if (voxels > 0) {
             box = {{active.min().x(), active.min().y(), active.min().z()},

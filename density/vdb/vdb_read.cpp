@@ -14,6 +14,7 @@
 #include "density/openvdb_access.h"
 #include "density/vdb/block_stream.h"
 #include "density/vdb/mask_file.h"
+#include "density/vdb/serial_tree.h"
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_foreign.h"
@@ -88,20 +89,24 @@ void check_stated_size(const openvdb::GridBase& header, std::size_t memory_bytes
     }
     const auto voxels = meta_value<std::int64_t>(header, openvdb::GridBase::META_FILE_VOXEL_COUNT);
     if (voxels && *voxels > std::int64_t(memory_bytes / sizeof(float))) {
-        throw std::runtime_error("its " + std::to_string(*voxels) +
+        throw std::runtime_error("cannot read: its " + std::to_string(*voxels) +
                                  " voxels do not fit into the memory that is allowed");
     }
+}
+
+FloatGrid::Ptr float_grid(const openvdb::GridBase& grid, const FloatTree::Ptr& tree) {
+    auto result = FloatGrid::create(tree);
+    result->setTransform(grid.transform().copy());
+    return result;
 }
 
 // 1 where a voxel of a mask is active, and true where it has a value.
 template <typename Grid>
 FloatGrid::Ptr mask_as_float(const Grid& mask) {
-    auto result =
-        FloatGrid::create(FloatTree::Ptr(new FloatTree(mask.tree(), 0.0f, 1.0f, openvdb::TopologyCopy())));
-    for (auto value = mask.tree().cbeginValueOn(); value; ++value)
-        if (!*value) result->tree().fill(value.getBoundingBox(), 0.0f, false);
-    result->setTransform(mask.transform().copy());
-    return result;
+    return float_grid(mask, float_tree(mask.tree(), 0.0f, [](bool value, bool is_active) {
+                          const bool is_set = value && is_active;
+                          return FloatVoxel{is_set ? 1.0f : 0.0f, is_set};
+                      }));
 }
 
 FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
@@ -110,9 +115,10 @@ FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
     if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) return mask_as_float(*mask);
     const auto typed = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
     if (!typed) throw std::runtime_error("it is damaged: a grid changed its type");
-    auto result = FloatGrid::create(FloatTree::Ptr(new FloatTree(typed->tree())));
-    result->setTransform(grid->transformPtr());
-    return result;
+    return float_grid(*typed,
+                      float_tree(typed->tree(), float(typed->background()), [](double value, bool is_active) {
+                          return FloatVoxel{float(value), is_active};
+                      }));
 }
 
 // Returns nephos_bbox where present and valid for all voxels, else the bounds of the active voxels.
@@ -224,7 +230,7 @@ void send_density(VdbArchive& archive, const VdbReadOptions& options, bool masks
         throw std::runtime_error("its background is " + number_text(grid->background(), 6) +
                                  ", not 0: it is no fog volume");
     }
-    if (grid->activeVoxelCount() > memory_bytes / sizeof(float)) throw std::bad_alloc();
+    if (count_active(grid->tree()) > memory_bytes / sizeof(float)) throw std::bad_alloc();
     if (options.list_grids) send_info(archive, writer);
     writer.text(archive.entries()[n].descriptor.gridName());
     auto metadata = from_meta_map(header);

@@ -112,7 +112,8 @@ void in_sandbox(std::span<const std::filesystem::path> paths, const VdbReadLimit
                 }
             } catch (const std::bad_alloc&) {
                 if (!by_size) throw;
-                throw std::runtime_error("reading it takes more than " + bytes_text(bounded.memory_bytes) +
+                throw std::runtime_error("cannot read: it takes more than " +
+                                         bytes_text(bounded.memory_bytes) +
                                          " of memory, the most for a file of its size");
             } catch (const std::ios_base::failure& error) {
                 throw std::runtime_error(reason_of(error.code()));

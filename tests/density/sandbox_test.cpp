@@ -22,6 +22,7 @@
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "core/error.h"
@@ -102,9 +103,9 @@ TEST(Sandbox, EndsWhatRunsTooLong) {
         while (forever) {
         }
     };
-    EXPECT_EQ(error_of(busy, limits), "subject.vdb: reading it takes longer than allowed");
+    EXPECT_EQ(error_of(busy, limits), "subject.vdb: cannot read: it takes longer than allowed");
     const auto asleep = [](SandboxWriter&) { ::pause(); };
-    EXPECT_EQ(error_of(asleep, limits), "subject.vdb: reading it takes longer than allowed");
+    EXPECT_EQ(error_of(asleep, limits), "subject.vdb: cannot read: it takes longer than allowed");
     const auto elapsed = std::chrono::steady_clock::now() - start;
     EXPECT_LT(std::chrono::duration<double>(elapsed).count(), 5.0);
 }
@@ -130,9 +131,33 @@ TEST(Sandbox, EndsWhatStaysAfterItsResult) {
         for (int fd = STDERR_FILENO + 1; fd < 1024; ++fd) ::close(fd);
         for (;;) ::pause();
     };
-    EXPECT_EQ(error_of(closed, limits), "subject.vdb: reading it takes longer than allowed");
+    EXPECT_EQ(error_of(closed, limits), "subject.vdb: cannot read: it takes longer than allowed");
     const auto elapsed = std::chrono::steady_clock::now() - start;
     EXPECT_LT(std::chrono::duration<double>(elapsed).count(), 10.0);
+}
+
+// Ctrl-Z, or a batch system that suspends a job: what passes then is nobody's time.
+TEST(Sandbox, TimeStandsStillWhileItsReaderIsStopped) {
+    const pid_t reader = ::fork();
+    ASSERT_GE(reader, 0);
+    if (reader == 0) {
+        SandboxLimits limits;
+        limits.seconds = 3;
+        const std::string error = error_of(
+            [](SandboxWriter& writer) {
+                ::usleep(800'000);
+                writer.value(1);
+            },
+            limits);
+        ::_exit(error.empty() ? 0 : 1);
+    }
+    ::usleep(200'000);
+    ::kill(reader, SIGSTOP);
+    ::usleep(4'000'000);
+    ::kill(reader, SIGCONT);
+    int status = -1;
+    ASSERT_EQ(::waitpid(reader, &status, 0), reader);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -150,7 +175,7 @@ TEST(Sandbox, EndsWhatComputesTooLong) {
         for (int n = 0; n < 4; ++n) std::thread(compute).detach();
         compute();
     };
-    EXPECT_EQ(error_of(busy, limits), "subject.vdb: reading it takes longer than allowed");
+    EXPECT_EQ(error_of(busy, limits), "subject.vdb: cannot read: it takes longer than allowed");
 }
 
 TEST(Sandbox, EndsWhatTakesTooMuchMemory) {

@@ -468,7 +468,7 @@ TEST(VdbRead, ScatteredTilesTakeBoundedMemory) {
     EXPECT_EQ(message_at(3), "");
     for (const std::size_t shift : {7, 12})
         EXPECT_EQ(message_at(shift),
-                  "subject: reading it takes more than the 64 MiB of memory that are allowed");
+                  "subject: cannot read: it takes more than the 64 MiB of memory that are allowed");
 }
 
 // OpenVDB reads as many bytes as the negated size of a chunk says into memory that has no room for them.

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What OpenVDB does with trees in parallel, done by one thread: in a forked process the threads of oneTBB are not there, and what
+// waits for a lock that one of them held at that moment waits for ever. Private to density/vdb.
+
+#include <cstdint>
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Count.h>
+
+#include "density/openvdb_access.h"
+
+namespace nephos {
+
+template <class Tree>
+std::uint64_t count_active(const Tree& tree) {
+    return openvdb::tools::countActiveVoxels(tree, false);
+}
+
+// A voxel of the result.
+struct FloatVoxel {
+    float value;
+    bool is_active;
+};
+
+// Returns a tree of the same shape: `convert` makes a FloatVoxel of a value and whether it is active, which may not depend on
+// where it is.
+template <class Tree, class Convert>
+FloatTree::Ptr float_tree(const Tree& tree, float background, const Convert& convert) {
+    auto result = std::make_shared<FloatTree>(background);
+    auto tile = tree.cbeginValueAll();
+    tile.setMaxDepth(decltype(tile)::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        const FloatVoxel voxel = convert(tile.getValue(), tile.isValueOn());
+        if (voxel.is_active || voxel.value != background)
+            result->addTile(tile.getLevel(), tile.getCoord(), voxel.value, voxel.is_active);
+    }
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+        FloatTree::LeafNodeType* to = result->touchLeaf(leaf->origin());
+        for (openvdb::Index n = 0; n < FloatTree::LeafNodeType::SIZE; ++n) {
+            const FloatVoxel voxel = convert(leaf->getValue(n), leaf->isValueOn(n));
+            to->setValueOnly(n, voxel.value);
+            to->setActiveState(n, voxel.is_active);
+        }
+    }
+    return result;
+}
+
+}  // namespace nephos
