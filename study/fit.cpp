@@ -10,6 +10,7 @@
 
 #include "study/design.h"
 #include "study/emulator.h"
+#include "study/target_match.h"
 #include "study/transform.h"
 #include <Eigen/Dense>
 #include <fmt/format.h>
@@ -101,9 +102,7 @@ class Fitter {
         for (const FitTarget& target : problem.targets) {
             without_.push_back(0);
             transforms_.push_back(transform_of(target.statistic));
-            z_.push_back(forward(transforms_.back(), target.value));
-            sd_.push_back(slope(transforms_.back(), target.value) * target.sd);
-            if (!std::isfinite(z_.back()) || !(target.sd > 0))
+            if (!std::isfinite(forward(transforms_.back(), target.value)) || !(target.sd > 0))
                 throw Error(ErrorCode::usage, fmt::format("target {}: {} +- {} is not possible",
                                                           target.statistic, target.value, target.sd));
         }
@@ -147,7 +146,7 @@ class Fitter {
         tried_.insert(points.begin(), points.end());
         for (FitRun& run : simulate_(wave, points)) {
             bool whole = true;
-            for (std::size_t n = 0; n < z_.size(); ++n) {
+            for (std::size_t n = 0; n < transforms_.size(); ++n) {
                 run.errors[n] *= slope(transforms_[n], run.statistics[n]);
                 run.statistics[n] = forward(transforms_[n], run.statistics[n]);
                 without_[n] += !std::isfinite(run.statistics[n]);
@@ -179,7 +178,7 @@ class Fitter {
 
     void emulate() {
         emulators_.clear();
-        for (std::size_t n = 0; n < z_.size(); ++n) emulators_.push_back(emulator_of(n));
+        for (std::size_t n = 0; n < transforms_.size(); ++n) emulators_.push_back(emulator_of(n));
     }
 
     // From the runs of the region, or of ever larger ones about it: more runs know the slope better, but one polynomial may not
@@ -220,22 +219,21 @@ class Fitter {
         }
     }
 
+    TargetMatch match_of(std::size_t target, const std::vector<double>& point) const {
+        const FitTarget& wanted = problem_.targets[target];
+        return match(transforms_[target], emulators_[target].at(point), {wanted.value, wanted.sd});
+    }
+
     double implausibility(const std::vector<double>& point) const {
         double worst = 0;
-        for (std::size_t n = 0; n < z_.size(); ++n) {
-            const Emulator::Prediction p = emulators_[n].at(point);
-            worst = std::max(worst, std::abs(z_[n] - p.mean) / std::sqrt(sd_[n] * sd_[n] + p.variance));
-        }
+        for (std::size_t n = 0; n < transforms_.size(); ++n)
+            worst = std::max(worst, match_of(n, point).distance);
         return worst;
     }
 
     double log_likelihood(const std::vector<double>& point) const {
         double sum = 0;
-        for (std::size_t n = 0; n < z_.size(); ++n) {
-            const Emulator::Prediction p = emulators_[n].at(point);
-            const double variance = sd_[n] * sd_[n] + p.variance;
-            sum -= (z_[n] - p.mean) * (z_[n] - p.mean) / variance / 2 + std::log(variance) / 2;
-        }
+        for (std::size_t n = 0; n < transforms_.size(); ++n) sum += match_of(n, point).log_likelihood;
         return sum;
     }
 
@@ -396,7 +394,7 @@ class Fitter {
             };
             result.parameters.push_back({mean, std::sqrt(square), quantile(0.05), quantile(0.95)});
         }
-        for (std::size_t n = 0; n < z_.size(); ++n) {
+        for (std::size_t n = 0; n < transforms_.size(); ++n) {
             double mean = 0, variance = 0;
             for (std::size_t p = 0; p < points.size(); ++p) {
                 const Emulator::Prediction prediction = emulators_[n].at(points[p]);
@@ -412,9 +410,10 @@ class Fitter {
 
     // Singular vectors of the Jacobian at the best point, its rows in units of what each target allows.
     void directions(const std::vector<double>& centre, FitResult& result) const {
-        Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(Eigen::Index(z_.size()), Eigen::Index(dimensions_));
-        for (std::size_t n = 0; n < z_.size(); ++n) {
-            const double scale = std::sqrt(sd_[n] * sd_[n] + emulators_[n].at(centre).variance);
+        Eigen::MatrixXd jacobian =
+            Eigen::MatrixXd::Zero(Eigen::Index(transforms_.size()), Eigen::Index(dimensions_));
+        for (std::size_t n = 0; n < transforms_.size(); ++n) {
+            const double scale = match_of(n, centre).sd;
             for (std::size_t d = 0; d < dimensions_; ++d) {
                 std::vector<double> low = centre, high = centre;
                 low[d] -= 1e-4;
@@ -448,7 +447,7 @@ class Fitter {
         result.proof = points.size();
         if (points.empty()) return;
         const std::vector<FitRun> runs = simulate_(4, points);
-        for (std::size_t n = 0; n < z_.size(); ++n) {
+        for (std::size_t n = 0; n < transforms_.size(); ++n) {
             double sum = 0, squares = 0, count = 0;
             for (const FitRun& run : runs) {
                 if (!std::isfinite(run.statistics[n])) continue;
@@ -472,7 +471,6 @@ class Fitter {
     // roughly, and the region of the emulators.
     Box looked_at_, box_;
     std::vector<Transform> transforms_;
-    std::vector<double> z_, sd_;  // targets and their sd, transformed
     std::vector<FitRun> runs_;    // statistics transformed
     std::set<Point> tried_;       // of all runs, those that were lost included
     std::uint64_t taken_ = 0;     // points of the Sobol sequence

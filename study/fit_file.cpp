@@ -149,6 +149,16 @@ void read_parameter(TomlTable& parameter, const SweepOptions& base, std::optiona
                          "expected `to` above `from`, and both above 0 on a log scale");
             return;
         }
+        constexpr double kNarrowest = 1e-9;  // of the larger end
+        const double width = to.to - to.from, largest = std::max(std::abs(to.from), std::abs(to.to));
+        if (!(width > kNarrowest * largest) || !std::isfinite(width) ||
+            (to.scale == Scale::log && !std::isfinite(to.to / to.from))) {
+            prior.report("to", "the prior is too narrow or too wide for its numbers to be told apart",
+                         "expected ends that differ by more than 1e-9 of the larger one, and whose "
+                         "difference, on a log "
+                         "scale their ratio, is finite");
+            return;
+        }
         for (const std::string& key : sound)
             if (measured && check_end(parameter, prior, "from", base, key, to.from))
                 check_end(parameter, prior, "to", base, key, to.to);

@@ -2,17 +2,22 @@
 #include "study/fit_folder.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 
 #include "study/folder_contents.h"
 #include "study/placed_scene.h"
 #include "study/plan_memory.h"
 #include "study/tables.h"
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
+#include "core/descriptor.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "core/text.h"
 #include "scenes/format/given_keys.h"
 #include "scenes/format/reader.h"
@@ -23,6 +28,14 @@ namespace {
 constexpr double kFewSamples = 200;
 
 struct Stopped {};
+
+// Opens the folder for its identity alone: the records of earlier waves are in it.
+Descriptor folder_of_fit(const std::filesystem::path& folder) {
+    Descriptor held(::open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    if (held.get() < 0)
+        throw Error(ErrorCode::io, folder.string() + ": cannot open the folder: " + std::strerror(errno));
+    return held;
+}
 
 std::string name_of(const FitParameter& parameter) {
     return fmt::format("{}", fmt::join(parameter.keys, "+"));
@@ -163,6 +176,13 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
     require_memory_for(plan_of_ends,
                        int(std::min<std::uint64_t>(std::uint64_t(job.workers), options.problem.runs)));
     const std::string& simulation_hash = plan_of_ends.simulation_hash();
+    create_folders(job.folder);
+    const Descriptor held = folder_of_fit(job.folder);
+    const auto require_in_place = [&] {
+        if (!is_same_file(held.get(), job.folder))
+            throw Error(ErrorCode::io,
+                        job.folder.string() + ": was removed or replaced while the fit was at work");
+    };
     std::vector<std::string> problems;
     const Simulate simulate = [&](int wave, const std::vector<std::vector<double>>& points) {
         const SweepPlan plan = plan_of(options, points);
@@ -171,6 +191,7 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
                         options.base.scene_file.string() +
                             ": a file that the scene names was changed after the fit began: the same "
                             "command fits with what is in it now");
+        require_in_place();
         SweepJob part = job;
         part.folder = job.folder / (wave == 4 ? "proof" : fmt::format("wave-{}", wave));
         const SweepReport report = run_sweep(
@@ -184,6 +205,7 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
     try {
         FitResult result = fit(options.problem, simulate);
         result.problems = std::move(problems);
+        require_in_place();
         write_results(options, result, job.folder);
         return result;
     } catch (const Stopped&) {

@@ -59,6 +59,14 @@ void require_same_wind(const Scene& scene, std::size_t lattice) {
                     "same all over each level: leave out --tracks");
 }
 
+// Returns whether a sample of an axis may have a value twice: of whole numbers, and of a range with few numbers in it.
+bool has_few_values(const Axis& axis) {
+    constexpr double kMany = 4294967296.0;  // 2^32
+    const double largest = std::max(std::abs(axis.from), std::abs(axis.to));
+    const double apart = std::nextafter(largest, std::numeric_limits<double>::infinity()) - largest;
+    return axis.scale == Scale::integer || !((axis.to - axis.from) / apart >= kMany);
+}
+
 // Calls `check`; an error without a place gets one, where that is known, and words before it. A failure of reading keeps its
 // own.
 void with_place(const SweepOptions& options, PlanPlace place, const std::string& before,
@@ -212,13 +220,12 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
     return equals;
 }
 
-// Points of a list, and those of a sample of whole numbers alone, may have all values in common: their runs would have the
-// same ids. Throws Error(usage) that names the first two.
+// Points of a list, and those of a sample of few values, may have all values in common: their runs would have the same ids.
+// Throws Error(usage) that names the first two.
 void SweepPlan::require_different_points(const std::vector<std::vector<std::string>>& equals) const {
-    const bool may_repeat = options_.design == Design::list ||
-                            (is_sampled(options_.design) && std::ranges::all_of(options_.axes, [](const Axis& axis) {
-                                 return axis.scale == Scale::integer;
-                             }));
+    const bool may_repeat =
+        options_.design == Design::list ||
+        (is_sampled(options_.design) && std::ranges::all_of(options_.axes, has_few_values));
     if (!may_repeat || options_.axes.empty()) return;
     std::vector<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>> hashes;
     hashes.reserve(points_);

@@ -40,10 +40,21 @@ bool read_all(int fd, void* to, std::size_t bytes) {
     return true;
 }
 
-bool send(int fd, std::uint64_t number, const std::string& content) {
+// Without a signal where nobody reads any more.
+bool send_all(int fd, std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+        const ssize_t sent = ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+        if (sent < 0 && errno == EINTR) continue;
+        if (sent < 0) return false;
+        bytes = bytes.subspan(std::size_t(sent));
+    }
+    return true;
+}
+
+bool send_message(int fd, std::uint64_t number, const std::string& content) {
     const Head head{number, content.size()};
-    return write_all(fd, std::as_bytes(std::span(&head, 1))) == 0 &&
-           write_all(fd, std::as_bytes(std::span(content))) == 0;
+    return send_all(fd, std::as_bytes(std::span(&head, 1))) &&
+           send_all(fd, std::as_bytes(std::span(content)));
 }
 
 struct Worker {
@@ -76,7 +87,7 @@ constexpr int kEndings[] = {SIGINT, SIGTERM, SIGHUP};
             failed = 1;
             result = error.what();
         }
-        if (!send(fd, failed, result)) break;
+        if (!send_message(fd, failed, result)) break;
     }
     ::_exit(0);  // no destructors: what they would flush belongs to the parent
 }
@@ -110,9 +121,12 @@ Worker start(const Task& task, const std::vector<Worker>& others) {
 std::string end_of(Worker& worker) {
     worker.socket.close();
     int status = 0;
-    while (::waitpid(worker.process, &status, 0) < 0 && errno == EINTR) {
-    }
+    pid_t ended = 0;
+    do {
+        ended = ::waitpid(worker.process, &status, 0);
+    } while (ended < 0 && errno == EINTR);
     worker.process = -1;
+    if (ended < 0) return "its process ended";  // SIGCHLD is ignored: the system does not say how
     if (WIFSIGNALED(status))
         return fmt::format("its process was ended by signal {} ({}){}", WTERMSIG(status),
                            ::strsignal(WTERMSIG(status)),
@@ -131,7 +145,8 @@ class Pool {
     ~Pool() {
         for (Worker& worker : workers_) {
             if (worker.process < 0) continue;
-            if (worker.task) ::kill(worker.process, SIGKILL);
+            ::kill(worker.process,
+                   SIGKILL);  // also an idle one, which may be stopped: it has nothing to flush
             end_of(worker);
         }
     }
@@ -163,7 +178,15 @@ class Pool {
     bool give(Worker& worker, std::optional<std::uint64_t> task) {
         if (!task) return false;
         worker.task = task;
-        send(worker.socket.get(), *task, {});  // a worker that is gone is found when its answer is read
+        if (send_message(worker.socket.get(), *task, {})) return true;
+        // It ended while it had nothing to do, or the system has no room for a message.
+        ::kill(worker.process, SIGKILL);
+        end_of(worker);
+        worker = start(task_, workers_);
+        worker.task = task;
+        if (!send_message(worker.socket.get(), *task, {}))
+            throw Error(ErrorCode::io,
+                        fmt::format("cannot hand a run to a worker: {}", std::strerror(errno)));
         return true;
     }
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <csignal>
 #include <map>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -55,6 +56,25 @@ TEST(Workers, ACrashCostsOneTask) {
     EXPECT_EQ(ends.results.size(), 3u);
     EXPECT_NE(ends.failures[1].find("signal 9"), std::string::npos);
     EXPECT_EQ(ends.failures[2], "no such thing");
+}
+
+// A worker that went while it had nothing to do costs no task.
+TEST(Workers, ATaskIsHandedToAnotherWorker) {
+    Ends ends;
+    const Task task = [](std::uint64_t) -> std::string {
+        std::thread([] {
+            ::usleep(50'000);
+            ::_exit(1);
+        }).detach();
+        return "done";
+    };
+    const auto next = [first = first_numbers(3), given = 0]() mutable {
+        if (given++ > 0) ::usleep(300'000);
+        return first();
+    };
+    EXPECT_TRUE(work({1, {}, {}}, next, task, ends.keep()));
+    EXPECT_EQ(ends.results.size(), 3u);
+    EXPECT_TRUE(ends.failures.empty());
 }
 
 // Tasks that would take minutes are dropped at once when the work is stopped.

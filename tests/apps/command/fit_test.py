@@ -166,6 +166,8 @@ class Fit(Case):
         for old, new, says in (("statistic = \"cover\"", "statistic = \"cower\"", "did you mean \"cover\"?"),
                                ("[[parameter]]", "[[paramter]]", "did you mean `parameter`?"),
                                ("from = 0.02", "from = 0.4", "the prior is empty"),
+                               ("from = 0.02, to = 0.3", "from = 0.3, to = 0.30000000000000004", "the prior is too narrow or too wide"),
+                               ("from = 0.02, to = 0.3", "from = 1e-310, to = 0.3", "the prior is too narrow or too wide"),
                                ("sd = 0.003", "", "needs statistic, and value and sd or from"),
                                ("field.background.ext", "field.background.exd", "did you mean `ext`"),
                                ("to = 0.3", "to = 1.3", "field.background.ext"),
