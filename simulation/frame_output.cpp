@@ -56,9 +56,9 @@ void FrameOutput::finish_quietly() noexcept {
     }
 }
 
-void FrameOutput::finish_video() {
+void FrameOutput::finish_video(const std::function<bool()>& stop) {
     if (!video_) return;
-    video_->finish();
+    video_->finish(stop);
     video_.reset();
 }
 

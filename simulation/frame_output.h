@@ -61,8 +61,8 @@ class FrameOutput {
     // Makes the video of the frames from now on (run_video.h); call it before the first add().
     void start_video() { video_.emplace(settings_); }
     bool makes_video() const { return video_.has_value(); }
-    // Completes the video, if one was started. Precondition: finish(). Throws Error(io).
-    void finish_video();
+    // Completes the video, if one was started; `stop` as VideoWriter::finish(). Precondition: finish(). Throws Error(io).
+    void finish_video(const std::function<bool()>& stop);
 
   private:
     struct Drawn {

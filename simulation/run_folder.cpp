@@ -127,7 +127,7 @@ bool encode(const Simulation& simulation, RunRecorder& recorder, const RunSettin
     if (!recorder.makes_video()) return true;
     report_progress(observer, simulation, recorder, settings, "encoding");
     try {
-        recorder.finish_video();
+        recorder.finish_video(observer.stop);
     } catch (const Error&) {
         // Whoever stops the run may have ended ffmpeg too; then resuming encodes.
         if (!stopped(observer)) throw;

@@ -71,7 +71,7 @@ class RunRecorder : public SimulationSink {
     // The video of all frames, unless it is there already. One of a shorter run is made anew.
     void start_video(const Simulation& simulation);
     bool makes_video() const { return output_.makes_video(); }
-    void finish_video() { output_.finish_video(); }
+    void finish_video(const std::function<bool()>& stop) { output_.finish_video(stop); }
 
     std::vector<RunFiles> frame_files() const;
 

@@ -44,9 +44,9 @@ void RunVideo::add(int number, const Rgb8Image& image) {
     }
 }
 
-void RunVideo::finish() {
+void RunVideo::finish(const std::function<bool()>& stop) {
     read_back(last_ + 1);
-    writer_->finish();
+    writer_->finish(stop);
     writer_.reset();
 }
 

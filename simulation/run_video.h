@@ -4,6 +4,7 @@
 // The video of a run, made of its frames while they are drawn. Frames that an earlier process drew, before the
 // run was interrupted, are read back from their PNG files when the first new frame, or the end, comes.
 
+#include <functional>
 #include <optional>
 
 #include "render/image/image_file.h"
@@ -20,9 +21,9 @@ class RunVideo {
     // Takes the picture of a frame that has been drawn; frames come in order. A failure ends the video and not the
     // run: finish() then makes it of the PNG files, and throws what fails again.
     void add(int number, const Rgb8Image& image);
-    // Reads back the frames up to the last that were not added, and completes the file. Throws as VideoWriter
-    // and read_png().
-    void finish();
+    // Reads back the frames up to the last that were not added, and completes the file. `stop` as VideoWriter::finish().
+    // Throws as VideoWriter and read_png().
+    void finish(const std::function<bool()>& stop);
 
   private:
     void read_back(int end);

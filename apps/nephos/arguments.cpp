@@ -21,7 +21,7 @@ namespace {
 constexpr int kMaxThreads = 1024;
 
 [[noreturn]] void refuse(const std::string& text, const std::string& expected) {
-    throw Error(ErrorCode::usage, fmt::format("'{}' is not {}", text, expected));
+    throw Error(ErrorCode::usage, fmt::format("'{}' is not {}", shortened(text), expected));
 }
 
 template <class Number>
@@ -228,13 +228,10 @@ void print_warnings(const Scene& scene) {
     for (const std::string& warning : warnings(scene)) print_note(warning);
 }
 
-ThreadLimit::ThreadLimit(int threads) {
-    if (threads > 0) {
-        control_ =
-            new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
-    }
+void limit_threads(int threads) {
+    if (threads <= 0) return;
+    [[maybe_unused]] static const tbb::global_control* limit = nullptr;  // never deleted
+    limit = new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
 }
-
-ThreadLimit::~ThreadLimit() { delete static_cast<tbb::global_control*>(control_); }
 
 }  // namespace nephos

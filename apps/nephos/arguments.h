@@ -90,16 +90,8 @@ void print_scene_errors(const SceneErrors& errors);
 // Prints what a scene may not mean (scenes/format/warnings.h) on standard error.
 void print_warnings(const Scene& scene);
 
-// Limits the threads of oneTBB while it lives; 0 = no limit.
-class ThreadLimit {
-  public:
-    explicit ThreadLimit(int threads);
-    ~ThreadLimit();
-    ThreadLimit(const ThreadLimit&) = delete;
-    ThreadLimit& operator=(const ThreadLimit&) = delete;
-
-  private:
-    void* control_ = nullptr;
-};
+// Limits the threads of oneTBB until the program ends; 0 = no limit. Not for a part of it: an object that took the limit back
+// would start threads in its destructor, and the program ends by a signal where the system has none.
+void limit_threads(int threads);
 
 }  // namespace nephos

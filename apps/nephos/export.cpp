@@ -139,7 +139,7 @@ void print_plan(const ExportOptions& options, const ExportReport& report, bool p
 }
 
 int run_command(const ExportArguments& a) {
-    const ThreadLimit limit(a.work.threads);
+    limit_threads(a.work.threads);
     const ExportOptions options = options_of(a);
     ExportReport report;
     bool stopped = false;

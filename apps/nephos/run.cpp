@@ -240,7 +240,7 @@ int run(const RunArguments& a) {
         print_needs(a);
         return 0;
     }
-    const ThreadLimit limit(a.work.threads);
+    limit_threads(a.work.threads);
     RunSettings settings = settings_of(a);
     std::unique_ptr<ProgressBar> bar;
     RunObserver observer;

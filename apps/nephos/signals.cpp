@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <atomic>
 #include <cstdint>
+#include <cstdlib>
 #include <ctime>
+#include <string>
 
 #include <signal.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include "apps/nephos/commands.h"
@@ -39,6 +42,14 @@ void on_stop(int signal) {
     ::_exit(128 + signal);
 }
 
+// The Python module names itself there: what it calls ends with it, as by SIGTERM, however it ends.
+void end_with_caller() {
+    const char* caller = std::getenv("NEPHOS_CALLER");
+    if (caller == nullptr || std::to_string(::getppid()) != caller) return;
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (std::to_string(::getppid()) != caller) ::raise(SIGTERM);  // it had ended before
+}
+
 }  // namespace
 
 void install_signal_handlers() {
@@ -52,8 +63,10 @@ void install_signal_handlers() {
         if (::sigaction(signal, nullptr, &old) == 0 && old.sa_handler == SIG_IGN) continue;
         ::sigaction(signal, &action, nullptr);
     }
+    ::signal(SIGCHLD, SIG_DFL);  // ignored, as a parent may leave it, how a process ended could not be asked
     ::signal(SIGPIPE, SIG_IGN);
     ::signal(SIGXFSZ, SIG_IGN);
+    end_with_caller();
 }
 
 void defer_signals() { deferred.store(true); }

@@ -50,7 +50,7 @@ std::size_t chosen_layer(const StateArguments& a, const std::vector<LayerSimulat
 }
 
 int state(const StateArguments& a) {
-    const ThreadLimit limit(a.work.threads);
+    limit_threads(a.work.threads);
     const Scene scene = load_scene(a.scene, SceneUse::without_frames);
     refuse_to_replace(a.scene.file, a.out);
     refuse_to_replace(a.from, a.out);

@@ -34,7 +34,7 @@ Verification verify_folder(const VerifyArguments& a) {
 }
 
 int verify(const VerifyArguments& a) {
-    const ThreadLimit limit(a.work.threads);
+    limit_threads(a.work.threads);
     const Verification result = verify_folder(a);
     Output output;
     if (a.work.json) {

@@ -3,12 +3,15 @@
 
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <vector>
 
 #include <fcntl.h>
@@ -82,9 +85,18 @@ class Encoder {
 
     // Ends the input and waits. Throws Error(io) unless the command succeeded and says that it encoded `frames`: some
     // take an input that cannot be read for one that ends.
-    void finish(std::size_t frames) {
+    void finish(std::size_t frames, const std::function<bool()>& stop) {
         ours_.close();
-        const int status = wait();
+        constexpr auto kLook = std::chrono::milliseconds(10);
+        while (stop && is_running()) {
+            if (stop()) throw Error(ErrorCode::io, "ffmpeg was stopped before it had ended");
+            std::this_thread::sleep_for(kLook);
+        }
+        const std::optional<int> end = wait();
+        if (!end)
+            throw Error(ErrorCode::io,
+                        "how ffmpeg ended cannot be asked: expected a process that does not ignore SIGCHLD");
+        const int status = *end;
         if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
             const std::size_t encoded = frames_encoded();
             if (encoded == frames) return;
@@ -141,12 +153,20 @@ class Encoder {
         ::sched_setaffinity(child_, sizeof allowed, &allowed);
     }
 
-    int wait() {
+    bool is_running() const {
+        siginfo_t info{};
+        return ::waitid(P_PID, id_t(child_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
+    }
+
+    // Nothing where the system does not tell, as to a process that ignores SIGCHLD.
+    std::optional<int> wait() {
         int status = 0;
-        while (::waitpid(child_, &status, 0) < 0 && errno == EINTR) {
-        }
+        pid_t ended = 0;
+        do {
+            ended = ::waitpid(child_, &status, 0);
+        } while (ended < 0 && errno == EINTR);
         child_ = -1;
-        return status;
+        return ended < 0 ? std::nullopt : std::optional(status);
     }
 
     static std::string end_of(const Descriptor& file) {
@@ -233,9 +253,9 @@ struct VideoWriter::Impl {
           encoder(command_line(o), opened(file.temporary(), to), o.processors) {}
 
     // Throws Error(io), with ffmpeg's message where it left one.
-    void finish_encoder() {
+    void finish_encoder(const std::function<bool()>& stop = {}) {
         try {
-            encoder.finish(frames);
+            encoder.finish(frames, stop);
         } catch (const Error& error) {
             throw Error(ErrorCode::io, path.string() + ": " + error.what());
         }
@@ -264,10 +284,10 @@ void VideoWriter::add(std::span<const std::uint8_t> rgb) {
     throw Error(ErrorCode::io, impl_->path.string() + ": ffmpeg stopped reading before the last frame");
 }
 
-void VideoWriter::finish() {
+void VideoWriter::finish(const std::function<bool()>& stop) {
     if (impl_->frames == 0)
         throw Error(ErrorCode::usage, impl_->path.string() + ": a video needs at least one frame");
-    impl_->finish_encoder();
+    impl_->finish_encoder(stop);
     impl_->file.publish();
 }
 

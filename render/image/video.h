@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -36,9 +37,9 @@ class VideoWriter {
     // Takes one frame: 3 * width * height bytes, RGB, row 0 at the top. Waits while ffmpeg is behind. Throws
     // Error(usage) on another size, Error(io) with ffmpeg's message when it has failed.
     void add(std::span<const std::uint8_t> rgb);
-    // Waits for ffmpeg and gives the file its name. Throws Error(usage) when there was no frame, Error(io) as
-    // add().
-    void finish();
+    // Waits for ffmpeg and gives the file its name. `stop` is asked meanwhile, often; true ends ffmpeg. Throws Error(usage)
+    // when there was no frame, Error(io) as add(), and when it was stopped.
+    void finish(const std::function<bool()>& stop = {});
 
   private:
     struct Impl;

@@ -278,6 +278,31 @@ class Pictures(Case):
         self.assertGreater((self.folder / "out/frames/tiny.mp4").stat().st_size, 500)
 
     @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_a_signal_while_ffmpeg_hangs(self):
+        """One is enough; and how ffmpeg ended is known also to a command that was told to ignore how children end."""
+        hanging = self.folder / "hanging"
+        hanging.mkdir()
+        (hanging / "ffmpeg").write_text("#!/bin/sh\ncat > /dev/null; touch taken; exec sleep 60\n")
+        (hanging / "ffmpeg").chmod(0o700)
+        environment = {**self.environment, "PATH": f"{hanging}:{os.environ['PATH']}"}
+        command = [NEPHOS, "run", self.scene, "--video", "--splatting", "cpu", "--out", "out", "-q"]
+        for number in (signal.SIGINT, signal.SIGTERM):
+            process = subprocess.Popen(command, cwd=self.folder, env=environment)
+            while not (self.folder / "taken").exists():
+                self.assertIsNone(process.poll())
+                time.sleep(0.05)
+            process.send_signal(number)
+            self.assertEqual(process.wait(timeout=20), 128 + number)
+            (self.folder / "taken").unlink()
+            command.append("--resume")
+        (hanging / "ffmpeg").write_text(f"#!/bin/sh\n{shutil.which('ffmpeg')} \"$@\"; exit 1\n")
+        ignoring = subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True,
+                                  preexec_fn=lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN))
+        self.assertEqual(ignoring.returncode, 3, ignoring.stderr)
+        self.call("run", self.scene, "--video", "--splatting", "cpu", "--out", "out", "--resume")
+        self.call("verify", "out")
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
     def test_a_video_that_failed_is_made_by_resuming(self):
         """A failing ffmpeg does not end the run; nor does a run that goes on with more steps keep the old video."""
         broken = self.folder / "broken"

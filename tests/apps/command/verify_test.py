@@ -74,6 +74,17 @@ class Verify(Case):
                 self.assertEqual((self.folder / "out" / file["path"]).stat().st_size, file["bytes"])
         self.assertEqual([f["path"] for f in manifest["run_files"]], ["statistics.csv", "checkpoint.nephos"])
 
+    @unittest.skipUnless(shutil.which("strace"), "strace is not installed")
+    def test_what_cannot_be_read_is_not_false(self):
+        """Neither a reader that the system refuses nor one that it gives no memory says anything of a file."""
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        self.call("export", "out", "--to", "raw", "--to", "vdb", "-o", "volumes")
+        for folder in ("out", "volumes"):
+            for call in ("seccomp:error=EINVAL", "prlimit64:error=EPERM:when=5+"):
+                said = subprocess.run(["strace", "-f", "-qq", "-e", "trace=" + call.split(":")[0], "-e", "inject=" + call, "-o", "/dev/null",
+                                       NEPHOS, "verify", folder, "-j1"], cwd=self.folder, env=self.environment, capture_output=True, text=True)
+                self.assertIn(said.returncode, (0, 3) if "prlimit64" in call else (3,), said.stdout + said.stderr)
+
     def test_checksums_are_those_of_xxhash(self):
         import xxhash
         self.call("run", self.scene, "--no-render", "--out", "out")
