@@ -5,8 +5,8 @@
 #include <array>
 
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
+#include "apps/editor/field_text.h"
 #include "apps/editor/state.h"
 #include "core/error.h"
 
@@ -154,8 +154,7 @@ void file_dialog(Editor& editor) {
         ImGui::EndChild();
     }
     ImGui::SetNextItemWidth(-1);
-    if (ImGui::InputTextWithHint("##name", "name of the file", &editor.dialog_name,
-                                 ImGuiInputTextFlags_EnterReturnsTrue)) {
+    if (input_text("##name", editor.dialog_name, "name of the file", ImGuiInputTextFlags_EnterReturnsTrue)) {
         accepted = true;
     }
     editor.controls.note("file name");

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
+#include "apps/editor/field_text.h"
 #include "apps/editor/state.h"
 #include "core/error.h"
 #include "scenes/format/warnings.h"
@@ -320,9 +320,10 @@ void text_panel(Editor& editor) {
         editor.text_version = editor.document->version();
     }
     const float below = count > 0 ? std::min(14 * em, 0.4f * ImGui::GetContentRegionAvail().y) : 0;
-    if (ImGui::InputTextMultiline("##text", &editor.text_buffer,
-                                  ImVec2(-1, ImGui::GetContentRegionAvail().y - below - (count > 0 ? 6 : 0)),
-                                  ImGuiInputTextFlags_AllowTabInput)) {
+    input_lines("##text", editor.text_buffer,
+                ImVec2(-1, ImGui::GetContentRegionAvail().y - below - (count > 0 ? 6 : 0)),
+                ImGuiInputTextFlags_AllowTabInput);
+    if (editor.text_buffer != editor.document->text()) {
         attempt(editor, [&] { editor.document->edit(editor.text_buffer, "Type", "text"); });
         editor.text_version = editor.document->version();
     }

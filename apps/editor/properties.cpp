@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
+#include "apps/editor/field_text.h"
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
 #include "apps/editor/value_controls.h"
@@ -212,7 +212,7 @@ std::size_t models_from_files(const Editor& editor) {
 
 void properties_panel(Editor& editor) {
     ImGui::SetNextItemWidth(-1);
-    ImGui::InputTextWithHint("##filter", "Find a key of the scene", &editor.filter);
+    input_text("##filter", editor.filter, "Find a key of the scene");
     editor.controls.note("find");
     if (ImGui::BeginChild("keys")) {
         if (!editor.filter.empty()) {

@@ -64,6 +64,11 @@ std::string readable_name(std::string_view name) {
     return out;
 }
 
+// Of key frames, climates and levels.
+bool rises_from_item_to_item(const Key& tables, const Key& key) {
+    return key.name == "time_s" || key.name == "state" || (tables.name == "levels" && key.name == "height_m");
+}
+
 std::string readable_name(const Key& key) {
     // In the file they are short; beside a slider they need not be.
     static constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kLong{{
@@ -222,9 +227,8 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
                 value += name + " = " + inner;
             }
             value += value.size() > 3 ? " }]" : "}]";
-        } else if (key.kind == KeyKind::number && (key.name == "time_s" || key.name == "state") &&
-                   array != nullptr) {
-            double last = 0;  // times and states rise
+        } else if (key.kind == KeyKind::number && rises_from_item_to_item(tables, key) && array != nullptr) {
+            double last = 0;
             for (const Node& item : array->items) {
                 const Entry* entry = item.find(key.name);
                 if (entry == nullptr) continue;
@@ -232,7 +236,7 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
                 last = std::max(last,
                                 number.kind == Node::Kind::integer ? double(number.integer) : number.number);
             }
-            const double step = key.name == "state" ? 0.25 : 600;
+            const double step = key.name == "state" ? 0.25 : key.name == "height_m" ? 500 : 600;
             value = number_text(array->items.empty() ? 0 : std::min(last + step, key.limits.max), 6);
         } else if (key.name == "position_m" && tables.section->find("target_m") != nullptr) {
             value = default_of_kind(key, {centre_m.x, centre_m.y - 4000, std::max(2.0, centre_m.z - 500)});
@@ -241,7 +245,8 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
         }
         if (!value.empty()) entries.emplace_back(key.name, value);
     }
-    if (tables.name == "levels") {  // a level has a wind, in one of its two forms
+    if (tables.name == "levels" &&
+        tables.section->find("from_deg") != nullptr) {  // a wind, in one of its two forms
         entries.emplace_back("from_deg", "270");
         entries.emplace_back("speed_m_per_s", "5");
     }

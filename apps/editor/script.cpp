@@ -12,6 +12,7 @@
 
 #include <GLFW/glfw3.h>
 
+#include "apps/editor/field_text.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -344,7 +345,7 @@ void Script::apply(Editor& editor) {
         io.KeysDown[input.key] = true;
         last_key_ = input.key;
     }
-    if (!input.text.empty()) io.AddInputCharactersUTF8(input.text.c_str());
+    if (!input.text.empty()) io.AddInputCharactersUTF8(field_text(input.text).c_str());
 }
 
 }  // namespace nephos

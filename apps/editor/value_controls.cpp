@@ -6,8 +6,8 @@
 #include <functional>
 
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
+#include "apps/editor/field_text.h"
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
 #include "scenes/format/text.h"
@@ -175,7 +175,7 @@ std::optional<std::string> edit_text(Editor& editor, const ValueRow& row) {
         text = std::to_string(row.node->integer);
     ImGui::BeginGroup();
     ImGui::SetNextItemWidth(width_before_file_button(row));
-    ImGui::InputText("##value", &text);
+    input_text("##value", text);
     const bool typed = ImGui::IsItemDeactivatedAfterEdit();
     file_choice(editor, row, [](const std::string& name) { return toml_string(name); });
     ImGui::EndGroup();
@@ -270,7 +270,7 @@ std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
     ImGui::SetNextItemWidth(names.empty() ? width_before_file_button(row) : -1);
     if (names.empty()) {
         ImGui::BeginGroup();
-        ImGui::InputText("##value", &shown);
+        input_text("##value", shown);
         const bool typed = ImGui::IsItemDeactivatedAfterEdit();
         file_choice(editor, row, [texts, as_toml](const std::string& name) {
             std::vector<std::string> more = texts;

@@ -17,6 +17,7 @@
 #include <backends/imgui_impl_vulkan.h>
 #include <dlfcn.h>
 
+#include "apps/editor/field_text.h"
 #include "apps/editor/vulkan_parts.h"
 #include "core/digest.h"
 #include "core/error.h"
@@ -151,6 +152,10 @@ struct Window::Impl {
             static_cast<Impl*>(glfwGetWindowUserPointer(window))->shown.clear();
         });
         ImGui_ImplGlfw_InitForVulkan(handle.window, true);
+        glfwSetCharCallback(handle.window, [](GLFWwindow* window, unsigned code) {
+            ImGui_ImplGlfw_CharCallback(window, field_character(code));
+        });
+        keep_clipboard_apart();
         chain.create(framebuffer_size());
         ImGui_ImplVulkan_InitInfo info{};
         info.Instance = *gpu.instance;

@@ -84,6 +84,57 @@ class Safety(Case):
         self.assertEqual(saved["sun"]["elevation_deg"], 21)
         self.assertEqual(saved["model"], tomllib.loads(MODELS)["model"])
 
+    def test_any_character_and_any_end_of_a_line(self):
+        """Characters beyond U+FFFF and private ones, in the text and in a value, stay what they are; a click changes nothing;
+        and what is typed at the end of a line stands before its end."""
+        scene = self.folder / "any.toml"
+        text = "seed = 1 # \U0001f329\U0001f329\ue000\r\nname = \"m\U0001f329\"\r\n[lattice]\r\ncells = [12, 10, 8]\r\n"
+        for more in ("", "type q"):
+            scene.write_text(text, encoding="utf-8", newline="")
+            self.edit(scene, script=f"""
+                wait 1
+                click tab Text
+                wait 0.3
+                click-at text 0.6 0.02
+                wait 0.5
+                key END
+                {more}
+                wait 0.5
+                click tab View
+                wait 0.5
+                key CTRL+S
+                wait 0.5
+                """)
+            self.assertEqual(scene.read_bytes().decode(), text.replace("\ue000\r", "\ue000q\r") if more else text)
+        self.edit(scene, script="""
+            wait 1
+            click scene
+            click tab Properties
+            wait 0.3
+            click name
+            key END
+            type xy
+            key ENTER
+            wait 0.5
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertEqual(tomllib.loads(scene.read_bytes().decode())["name"], "m\U0001f329xy")
+
+    def test_every_new_element_is_valid(self):
+        """What a `+` of the outline writes needs no hand in the text."""
+        scene = self.folder / "new.toml"
+        scene.write_text("[lattice]\ncells = [12, 10, 8]\n", encoding="utf-8")
+        # Those of files, wind_field and field.grids, want their name.
+        script = "wait 1\nclick field\nwait 0.5\n"
+        for table in ("wind", "wind[0].levels", "lightning", "model", "sky", "field.profile", "field.profile[0].levels", "field.ellipsoids",
+                      "field.scatters", "layer"):
+            script += f'click "new {table}"\nwait 0.7\n'
+        self.edit(scene, script=script + "key CTRL+S\nwait 0.5\n")
+        self.assertIn("levels", tomllib.loads(scene.read_text(encoding="utf-8"))["field"]["profile"][0])
+        done = subprocess.run([NEPHOS, "validate", scene], capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
     def test_saving_over_another_file_asks(self):
         """Save as, onto a file that is there: the first press asks, another name takes the question back, and only
         Replace it overwrites. The scene's own file is no question."""

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/editor/field_text.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <vector>
+
+#include <imgui_stdlib.h>
+
+namespace nephos {
+namespace {
+
+constexpr unsigned kFirstPrivate = 0xE000, kLastPrivate = 0xF8FF, kLastOfField = 0xFFFF;
+
+bool needs_another(unsigned code) {
+    return code > kLastOfField || (code >= kFirstPrivate && code <= kLastPrivate);
+}
+
+// Of ImGui's fields as a whole, like its context.
+struct Table {
+    std::map<unsigned, unsigned> fields;  // private characters by what they stand for
+    std::vector<unsigned> codes;          // the n-th of them stands for
+};
+
+Table& table() {
+    static Table all;
+    return all;
+}
+
+// A character of UTF-8 and its bytes: one byte where they are invalid.
+struct Character {
+    unsigned code = 0;
+    std::size_t bytes = 1;
+};
+
+Character character_at(std::string_view text, std::size_t at) {
+    const auto byte = [&](std::size_t n) {
+        return at + n < text.size() ? unsigned(static_cast<unsigned char>(text[at + n])) : 0u;
+    };
+    const unsigned first = byte(0);
+    const std::size_t bytes = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : first >= 0xC0 ? 2 : 1;
+    unsigned code = bytes == 1 ? first : first & (0x7Fu >> bytes);
+    for (std::size_t n = 1; n < bytes; ++n) {
+        if ((byte(n) & 0xC0u) != 0x80u) return {first, 1};
+        code = code << 6 | (byte(n) & 0x3Fu);
+    }
+    return {code, bytes};
+}
+
+void append_utf8(std::string& text, unsigned code) {
+    if (code > kLastOfField) text += char(0xF0 | code >> 18);
+    text += char(code > kLastOfField ? 0x80 | (code >> 12 & 0x3F) : 0xE0 | code >> 12);
+    text += char(0x80 | (code >> 6 & 0x3F));
+    text += char(0x80 | (code & 0x3F));
+}
+
+// Returns the text with other characters in place of those that need them.
+template <class Other>
+std::string replaced(std::string_view text, const Other& other) {
+    std::string out;
+    out.reserve(text.size());
+    for (std::size_t at = 0; at < text.size();) {
+        const Character c = character_at(text, at);
+        if (c.bytes >= 3 && needs_another(c.code))
+            append_utf8(out, other(c.code));
+        else
+            out.append(text, at, c.bytes);
+        at += c.bytes;
+    }
+    return out;
+}
+
+bool ends_lines_with_return(std::string_view text) {
+    const std::size_t end = text.find('\n');
+    return end != text.npos && end > 0 && text[end - 1] == '\r';
+}
+
+std::string without_returns(std::string_view text) {
+    std::string out;
+    out.reserve(text.size());
+    for (std::size_t at = 0; at < text.size(); ++at)
+        if (text[at] != '\r' || at + 1 == text.size() || text[at + 1] != '\n') out += text[at];
+    return out;
+}
+
+std::string with_returns(std::string_view text) {
+    std::string out;
+    for (const char c : text) {
+        if (c == '\n') out += '\r';
+        out += c;
+    }
+    return out;
+}
+
+// Shows `text` in a field by `show`, which returns what ImGui does.
+template <class Show>
+bool edited(std::string& text, const Show& show) {
+    std::string field = field_text(text);
+    const bool is_held = text.find('\0') == text.npos && text_of_field(field) == text;
+    const std::string before = field;
+    const bool result = show(field, is_held ? 0 : ImGuiInputTextFlags_ReadOnly);
+    field.resize(std::min(field.size(), field.find('\0')));  // what ImGui leaves behind its end
+    if (is_held && field != before) text = text_of_field(field);
+    return result;
+}
+
+// What the backend has set.
+struct Clipboard {
+    const char* (*get)(void*) = nullptr;
+    void (*set)(void*, const char*) = nullptr;
+    void* data = nullptr;
+    std::string field;  // what ImGui was given last
+};
+
+}  // namespace
+
+unsigned field_character(unsigned code) {
+    if (!needs_another(code)) return code;
+    Table& all = table();
+    const auto [found, added] = all.fields.try_emplace(code, kFirstPrivate + unsigned(all.codes.size()));
+    if (!added) return found->second;
+    if (found->second > kLastPrivate) {
+        constexpr unsigned kReplacement = 0xFFFD;
+        all.fields.erase(found);
+        return kReplacement;
+    }
+    all.codes.push_back(code);
+    return found->second;
+}
+
+std::string field_text(std::string_view text) { return replaced(text, field_character); }
+
+std::string text_of_field(std::string_view field) {
+    return replaced(field, [](unsigned code) {
+        const std::vector<unsigned>& codes = table().codes;
+        const bool is_known = code <= kLastPrivate && code - kFirstPrivate < codes.size();
+        return is_known ? codes[code - kFirstPrivate] : code;
+    });
+}
+
+bool input_text(const char* label, std::string& text, const char* hint, ImGuiInputTextFlags flags) {
+    return edited(text, [&](std::string& field, ImGuiInputTextFlags more) {
+        return hint == nullptr ? ImGui::InputText(label, &field, flags | more)
+                               : ImGui::InputTextWithHint(label, hint, &field, flags | more);
+    });
+}
+
+bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGuiInputTextFlags flags) {
+    std::string lines = without_returns(text);
+    const std::string before = lines;
+    const bool result = edited(lines, [&](std::string& field, ImGuiInputTextFlags more) {
+        return ImGui::InputTextMultiline(label, &field, size, flags | more);
+    });
+    if (lines != before) text = ends_lines_with_return(text) ? with_returns(lines) : lines;
+    return result;
+}
+
+void keep_clipboard_apart() {
+    static Clipboard clipboard;
+    ImGuiIO& io = ImGui::GetIO();
+    clipboard = {io.GetClipboardTextFn, io.SetClipboardTextFn, io.ClipboardUserData, {}};
+    io.GetClipboardTextFn = [](void*) -> const char* {
+        const char* text = clipboard.get(clipboard.data);
+        if (text == nullptr) return nullptr;
+        clipboard.field = field_text(text);
+        return clipboard.field.c_str();
+    };
+    io.SetClipboardTextFn = [](void*, const char* field) {
+        clipboard.set(clipboard.data, text_of_field(field).c_str());
+    };
+}
+
+}  // namespace nephos

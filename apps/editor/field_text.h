@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Text in the fields of Dear ImGui, for any text. Its packaged library has characters of 16 bits and lines that end with "\n":
+// a character beyond U+FFFF (a symbol of weather, say) would be replaced for good by U+FFFD, and what is typed at the end of a
+// line with "\r\n" would stand behind the "\r". In fields, private characters (U+E000 to U+F8FF) stand for those beyond, and
+// for the private ones of a text. There is one table of them, so that texts can be copied between fields; all functions are
+// for the thread that draws.
+
+#include <string>
+#include <string_view>
+
+#include <imgui.h>
+
+namespace nephos {
+
+// Return a text as a field holds it, and the text of a field. A text beyond the table's 6,400 characters does not come back.
+std::string field_text(std::string_view text);
+std::string text_of_field(std::string_view field);
+// Returns the character that stands for one that is typed.
+unsigned field_character(unsigned code);
+
+// As ImGui::InputText() or, with a hint, InputTextWithHint(). Only what the user does changes `text`; one that no field can
+// hold, as it has a byte of 0, is read-only.
+bool input_text(const char* label, std::string& text, const char* hint = nullptr,
+                ImGuiInputTextFlags flags = 0);
+
+// As ImGui::InputTextMultiline(); lines that are added end as the first one does.
+bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGuiInputTextFlags flags = 0);
+
+// Has the clipboard hold texts and not their fields. To be called once, when the backend has set its own functions.
+void keep_clipboard_apart();
+
+}  // namespace nephos
