@@ -26,6 +26,8 @@
 #include "apps/python/released_lock.h"
 #include "apps/python/scene_text.h"
 #include "core/error.h"
+#include "scenes/format/override.h"
+#include "scenes/format/text.h"
 
 namespace py = pybind11;
 using namespace py::literals;
@@ -103,6 +105,9 @@ void add_scene(py::module_& module) {
         .def(
             "set",
             [](const SceneText& scene, const std::string& key, const py::object& value) {
+                // A key with a "=" of its own would set something else.
+                if (const std::string problem = key_problem(key); !problem.empty())
+                    throw Error(ErrorCode::usage, "'" + shortened(key) + "': " + problem);
                 const std::string setting = key + "=" + toml_text(value);
                 const ReleasedLock released;
                 return scene.with(setting);
@@ -366,6 +371,17 @@ void add_simulation(py::module_& module) {
         });
 }
 
+// Python's own way, by protocols 0 and 1, leaves what the object holds out, and ends the process that reads it back.
+void refuse_pickling(const py::object& type) {
+    type.attr("__reduce__") = py::cpp_function(
+        [](const py::object& self) -> py::object {
+            const auto name = py::type::of(self).attr("__name__").cast<std::string>();
+            throw py::type_error("cannot pickle '" + name +
+                                 "': send the scene's text(), and its steps and seed, instead");
+        },
+        py::name("__reduce__"), py::is_method(type));
+}
+
 void set_threads(int count) {
     static std::unique_ptr<tbb::global_control> limit;
     if (count < 0)
@@ -394,6 +410,7 @@ PYBIND11_MODULE(_nephos, module) {
     nephos::add_scene(module);
     nephos::add_density(module);
     nephos::add_simulation(module);
+    for (const char* name : {"Scene", "Density", "Simulation"}) nephos::refuse_pickling(module.attr(name));
     module.def(
         "set_threads", &nephos::set_threads, "count"_a,
         "Limits the threads of all simulations of this process; 0: all cores. Results do not depend on it.");

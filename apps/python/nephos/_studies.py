@@ -47,7 +47,7 @@ def _call(arguments, allowed=(0,), plan=None, axes=()):
     `axes` has for a line of it."""
     try:
         process = subprocess.Popen([_command(), *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                                   text=True, errors="backslashreplace")
+                                   text=True, errors="backslashreplace", env={**os.environ, "NEPHOS_CALLER": str(os.getpid())})
     except OSError as error:
         raise _error(f"{error.filename}: cannot be run: {error.strerror}", "io", error.filename) from None
     try:

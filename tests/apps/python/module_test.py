@@ -2,10 +2,12 @@
 """The Python module against the `nephos` command: NEPHOS names the binary, SOURCE the source tree, and PYTHONPATH the
 folder of the package `nephos`. The arguments are those of unittest."""
 
+import copy
 import inspect
 import json
 import os
 import pathlib
+import pickle
 import re
 import shutil
 import signal
@@ -56,6 +58,25 @@ class Scenes(Case):
         for value in (endless, deep, Same()):
             with self.assertRaisesRegex(nephos.Error, "nested more than 64 deep"):
                 scene.set("lattice.cells", value)
+
+    def test_a_key_is_one_and_no_more(self):
+        scene = nephos.Scene(self.scene)
+        for key in ("seed=5 #", "field.background.ext = 0.3\n#", "", "wind[", "seed\0"):
+            with self.assertRaises(nephos.Error):
+                scene.set(key, 7)
+
+    def test_pickling_is_refused(self):
+        """By all protocols: what 0 and 1 would write has nothing in it."""
+        scene = nephos.Scene(self.scene)
+        simulation = nephos.Simulation(scene)
+        class Sub(nephos.Scene):
+            pass
+        for value in (scene, simulation, simulation.density(), Sub(self.scene)):
+            for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+                with self.assertRaisesRegex(TypeError, "cannot pickle"):
+                    pickle.dumps(value, protocol)
+            with self.assertRaises(TypeError):
+                copy.deepcopy(value)
 
     def test_files_of_a_scene_are_those_beside_it_wherever_python_goes(self):
         path = pathlib.Path(self.scene)
@@ -507,6 +528,30 @@ class Threads(Case):
         steps = simulation.step_number
         self.assertTrue(0 < steps < 10**9)
         self.assertEqual(simulation.step().step_number, steps + 1)
+
+    def test_a_sweep_ends_with_python(self):
+        """However that ends: a sweep that nobody waits for would keep its folder from the next one."""
+        script = self.write("sweep.py", f"""
+import nephos
+nephos.sweep({str(FAIR)!r}, {{"field.background.ext": [0.1, 0.11, 0.12, 0.13]}}, replicates=50, steps=(20000, 20000), workers=2, out="out")
+""")
+        def is_at_work(process):
+            try:
+                return os.readlink(process / "cwd") == str(self.folder.resolve())
+            except OSError:
+                return False
+
+        for number in (signal.SIGTERM, signal.SIGKILL):
+            python = subprocess.Popen([sys.executable, script], cwd=self.folder)
+            while not any((self.folder / "out").glob("shards/*.jsonl")):
+                self.assertIsNone(python.poll())
+                time.sleep(0.05)
+            python.send_signal(number)
+            self.assertEqual(python.wait(), -number)
+            begin = time.monotonic()
+            while any(is_at_work(process) for process in pathlib.Path("/proc").glob("[0-9]*")):
+                self.assertLess(time.monotonic() - begin, 20)
+                time.sleep(0.1)
 
     def test_an_exception_ends_a_sweep(self):
         """Whatever a handler raises: no process stays that works without its arguments, and the same call goes on."""
