@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "scenes/format/named_files.h"
 #include "scenes/format/schema_build.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
@@ -77,8 +78,9 @@ void finish_model(const SectionReader& reader, void* owner) {
     }
     if (reader.find("textures") != nullptr && model.textures.empty())
         reader.report("textures", reader.quoted("textures") + " names no file", "expected names of PNG files, or no such key");
-    if (std::ranges::count(model.textures, std::string()) > 0)
-        reader.report("textures", reader.quoted("textures") + " has an empty name", "expected names of PNG files");
+    if (std::ranges::any_of(model.textures, names_no_file))
+        reader.report("textures", reader.quoted("textures") + " has a text that names no file",
+                      "expected names of PNG files");
     try {
         check(model);
     } catch (const Error& error) {

@@ -20,7 +20,7 @@ constexpr const char* kAxisNames[] = {"east", "north", "up"};
 
 Json format_json(const ExportOptions& options, const ExportSequence& s, const NamedFormat& named) {
     const VolumeBox box = box_of(s.extent, s.placement, s.layout);
-    Json json = {{"format", named.name}, {"files", s.name + "_%04d" + std::string(named.extension)}};
+    Json json = {{"format", named.name}, {"files", frame_pattern(s.name, named)}};
     if (!is_dense(named.format)) {
         if (named.format == ExportFormat::flightgear) {
             json["type"] = "r8";
@@ -88,11 +88,20 @@ void replace_all(std::string& text, const std::string& key, const std::string& v
         text.replace(at, key.size(), value);
 }
 
+// A path between marks that it does not hold.
+std::string asset_path(const std::string& path) {
+    constexpr std::string_view kLongMark = "@@@";
+    if (path.find('@') == path.npos) return "@" + path + "@";
+    std::string text = path;
+    replace_all(text, std::string(kLongMark), "\\" + std::string(kLongMark));
+    return std::string(kLongMark) + text + std::string(kLongMark);
+}
+
 std::string asset_list(const ExportSequence& s) {
     std::string text;
     for (const SourceFrame& frame : s.frames)
-        text += fmt::format("                {}: @./{}@,\n", frame.number,
-                            frame_name(s, frame.number, ExportFormat::vdb));
+        text += fmt::format("                {}: {},\n", frame.number,
+                            asset_path("./" + frame_name(s, frame.number, ExportFormat::vdb)));
     return text;
 }
 

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "density/export/bricks.h"
+#include "scenes/format/text.h"
 #include "simulation/export/weather.h"
 #include "simulation/run_listing.h"
 #include "simulation/scene_place.h"
@@ -29,6 +30,16 @@ std::pair<std::string, std::optional<int>> split_name(const std::filesystem::pat
     std::string name = stem.substr(0, stem.size() - digits.size());
     while (!name.empty() && (name.back() == '_' || name.back() == '.' || name.back() == '-')) name.pop_back();
     return {name.empty() ? "volume" : name, number};
+}
+
+// Names stand in texts of formats that hold UTF-8 alone.
+void require_name(const std::filesystem::path& file, const std::string& name) {
+    if (find_invalid_utf8(name) == name.size() && printable(name) == name && name.find('\t') == name.npos)
+        return;
+    throw Error(ErrorCode::usage,
+                file.string() +
+                    ": its name has bytes that the texts of an export cannot hold: expected UTF-8 "
+                    "without control characters");
 }
 
 std::vector<WindTable> wind_of(const Scene& scene, std::optional<std::size_t> layer,
@@ -97,17 +108,21 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
     const std::vector<std::filesystem::path> files =
         options.files.empty() ? std::vector{options.source} : options.files;
     s.name = split_name(files.front()).first;
+    require_name(files.front(), s.name);
     const int least = split_name(files.front()).second.value_or(1);
-    int next = 1;
+    std::int64_t next = 1;
     for (const std::filesystem::path& file : files) {
-        const int number =
-            files.size() == 1 ? split_name(file).second.value_or(1) : split_name(file).second.value_or(next);
+        const std::int64_t number = split_name(file).second.value_or(files.size() == 1 ? 1 : next);
+        if (number > kMaxFrames)
+            throw Error(ErrorCode::usage,
+                        fmt::format("{}: its number {} is above {}, the most that a frame has", file.string(),
+                                    number, kMaxFrames));
         if (number < next && !s.frames.empty())
             throw Error(ErrorCode::usage,
                         file.string() + ": its number does not follow that of the file before");
         next = number + 1;
-        if (is_wanted(options, number, least))
-            s.frames.push_back({file, number, 0, {}, file_stamp(file), {}});
+        if (is_wanted(options, int(number), least))
+            s.frames.push_back({file, int(number), 0, {}, file_stamp(file), {}});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, "no file has a number of this range");
     read_first(options, s);
@@ -315,6 +330,12 @@ std::vector<ExportFormat> all_formats(const ExportOptions& options) {
 void require_unchanged(const SourceFrame& frame) {
     if (file_stamp(frame.file) == frame.stamp) return;
     throw Error(ErrorCode::io, frame.file.string() + ": was changed while it was exported: export it again");
+}
+
+std::string frame_pattern(const std::string& name, const NamedFormat& format) {
+    std::string pattern;
+    for (const char c : name) pattern += c == '%' ? std::string("%%") : std::string(1, c);
+    return pattern + "_%04d" + std::string(format.extension);
 }
 
 std::string frame_name(const ExportSequence& sequence, int number, ExportFormat format) {

@@ -77,6 +77,9 @@ void require_unchanged(const SourceFrame& frame);
 // Returns the name of a file: NAME_0001.EXT.
 std::string frame_name(const ExportSequence& sequence, int number, ExportFormat format);
 
+// Returns the printf pattern of these names, by the frame's number: NAME_%04d.EXT, a % of the name doubled.
+std::string frame_pattern(const std::string& name, const NamedFormat& format);
+
 // What is known of a frame once it was read.
 struct FrameFigures {
     double sum = 0, max = 0;

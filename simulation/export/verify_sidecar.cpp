@@ -113,7 +113,7 @@ void check_sidecar(const std::filesystem::path& path, const ListedExport& list,
         const auto type = list.types.find(std::string(format.name));
         if (type == list.types.end()) one.at("format").fail("a format of export.json");
         if (is_dense(format.format)) require_text(one.at("type"), std::string(type_name(type->second)));
-        require_text(one.at("files"), s.name + "_%04d" + std::string(format.extension));
+        require_text(one.at("files"), frame_pattern(s.name, format));
         extensions.emplace_back(format.extension);
     }
     const std::vector<CheckedJson> frames = json.at("frames").items();

@@ -241,7 +241,9 @@ TEST(ModelTextures, BadOnesAreSaidWithTheirPlace) {
         }
         return std::string();
     };
-    EXPECT_NE(problem("[\"\"]").find("scene.toml:3:12: error: `model[0].textures` has an empty name"), std::string::npos)
+    EXPECT_NE(
+        problem("[\"\"]").find("scene.toml:3:12: error: `model[0].textures` has a text that names no file"),
+        std::string::npos)
         << problem("[\"\"]");
     EXPECT_NE(problem("3").find("scene.toml:3:12"), std::string::npos) << problem("3");
     Scene scene = painted();

@@ -280,6 +280,35 @@ class Export(Case):
         self.assertIn("5 of 5 files were not compared: their sources are not there any more; only checksums and sidecars", said)
         self.assertIn("box, axes and levels were not compared", said)
 
+    def test_names_that_mean_something_in_texts(self):
+        """What a file is called stands in XML, in USD and in a printf pattern."""
+        import xml.dom.minidom
+        source = self.folder / "run/density/placed_0001.vdb"
+        for name in ('R&D <"1">', "100%d", "a@b", "a@@@b", "\u96f2"):
+            file = self.folder / f"{name}_0001.vdb"
+            shutil.copy(source, file)
+            self.call("export", file, "-o", "named", "--to", "vti", "--to", "usd", "--to", "raw")
+            self.call("verify", "named")
+            folder = self.folder / "named"
+            collection = xml.dom.minidom.parse(str(folder / f"{name}.pvd"))
+            self.assertEqual(collection.getElementsByTagName("DataSet")[0].getAttribute("file"), f"{name}_0001.vti")
+            sidecar = json.loads((folder / f"{name}.volume.json").read_text())
+            self.assertTrue((folder / (next(f["files"] for f in sidecar["formats"] if f["format"] == "raw") % 1)).is_file())
+            (asset,) = (line.split(": ", 1)[1].rstrip(",") for line in next(folder.glob("*.usda")).read_text().splitlines() if "_0001.vdb" in line)
+            mark = "@@@" if "@" in name else "@"
+            self.assertTrue(asset.startswith(f"{mark}./") and asset.endswith(f".vdb{mark}"), asset)
+            self.assertEqual(asset[len(mark):-len(mark)].replace("\\@@@", "@@@"), f"./{name}_0001.vdb")
+            shutil.rmtree(folder)
+        bad = os.fsencode(self.folder) + b"/a\xff_0001.vdb"
+        shutil.copy(source, bad)
+        for file in (bad, self.folder / "a\nb_0001.vdb"):
+            shutil.copy(source, file)
+            said = subprocess.run([NEPHOS, "export", file, "-o", "bad", "--to", "raw"], cwd=self.folder, capture_output=True)
+            self.assertEqual(said.returncode, 2, said.stderr)
+            self.assertIn(b"expected UTF-8 without control characters", said.stderr)
+        shutil.copy(source, self.folder / "c_2147483647.vdb")
+        self.refused(2, "export", "c_2147483647.vdb", "-o", "bad", "--to", "raw", says="its number 2147483647 is above 1000000")
+
     def test_a_changed_source_is_exported_anew(self):
         """Files of an export know their source: what another run of the same scene left is not taken over."""
         folder = self.export("out", "--to", "raw")
