@@ -6,7 +6,10 @@
 #include <map>
 #include <vector>
 
+#include <imgui_internal.h>
 #include <imgui_stdlib.h>
+
+#include "scenes/format/text.h"
 
 namespace nephos {
 namespace {
@@ -93,14 +96,62 @@ std::string with_returns(std::string_view text) {
     return out;
 }
 
+// Returns where the n-th character of without_returns(text) begins, with a return before it.
+std::size_t place_of(std::string_view text, std::size_t n) {
+    std::size_t at = 0;
+    for (; n > 0; --n, ++at)
+        if (text[at] == '\r' && at + 1 < text.size() && text[at + 1] == '\n') ++at;
+    return at;
+}
+
+// Puts what has become of the lines of a text into it: what is the same before and behind stays as it is.
+std::string with_lines(std::string_view text, std::string_view lines, std::string_view now) {
+    const auto differ = std::ranges::mismatch(lines, now);
+    const std::size_t before = std::size_t(differ.in1 - lines.begin());
+    std::size_t behind = 0;
+    while (behind < std::min(lines.size(), now.size()) - before &&
+           lines[lines.size() - 1 - behind] == now[now.size() - 1 - behind])
+        ++behind;
+    const std::string_view more = now.substr(before, now.size() - behind - before);
+    std::string out(text.substr(0, place_of(text, before)));
+    out += ends_lines_with_return(text) ? with_returns(more) : std::string(more);
+    return out.append(text.substr(place_of(text, lines.size() - behind)));
+}
+
+// The field that had the caret last: what it was given, and what it gave back. Of ImGui as a whole, which has one state of fields.
+struct LastField {
+    ImGuiID id = 0;
+    std::string given, taken;
+};
+
+LastField& last_field() {
+    static LastField last;
+    return last;
+}
+
+// Makes ImGui forget the copy of a text that it has of a field, where something else has changed the text.
+void forget_other_text(ImGuiID id, const std::string& field) {
+    LastField& last = last_field();
+    if (last.id != id || field == last.given || field == last.taken) return;
+    last.id = 0;
+    ImGuiInputTextState* const state = ImGui::GetInputTextState(id);
+    if (state == nullptr) return;
+    if (ImGui::GetActiveID() == id) ImGui::ClearActiveID();
+    state->ID = 0;
+}
+
 // Shows `text` in a field by `show`, which returns what ImGui does.
 template <class Show>
-bool edited(std::string& text, const Show& show) {
+bool edited(const char* label, std::string& text, const Show& show) {
+    const ImGuiID id = ImGui::GetCurrentWindow()->GetID(label);
     std::string field = field_text(text);
-    const bool is_held = text.find('\0') == text.npos && text_of_field(field) == text;
+    forget_other_text(id, field);
+    const bool is_held = text.find('\0') == text.npos && find_invalid_utf8(text) == text.size() &&
+                         text_of_field(field) == text;
     const std::string before = field;
     const bool result = show(field, is_held ? 0 : ImGuiInputTextFlags_ReadOnly);
     field.resize(std::min(field.size(), field.find('\0')));  // what ImGui leaves behind its end
+    if (ImGui::GetInputTextState(id) != nullptr) last_field() = {id, before, field};
     if (is_held && field != before) text = text_of_field(field);
     return result;
 }
@@ -140,7 +191,7 @@ std::string text_of_field(std::string_view field) {
 }
 
 bool input_text(const char* label, std::string& text, const char* hint, ImGuiInputTextFlags flags) {
-    return edited(text, [&](std::string& field, ImGuiInputTextFlags more) {
+    return edited(label, text, [&](std::string& field, ImGuiInputTextFlags more) {
         return hint == nullptr ? ImGui::InputText(label, &field, flags | more)
                                : ImGui::InputTextWithHint(label, hint, &field, flags | more);
     });
@@ -149,11 +200,12 @@ bool input_text(const char* label, std::string& text, const char* hint, ImGuiInp
 bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGuiInputTextFlags flags) {
     std::string lines = without_returns(text);
     const std::string before = lines;
-    const bool result = edited(lines, [&](std::string& field, ImGuiInputTextFlags more) {
+    edited(label, lines, [&](std::string& field, ImGuiInputTextFlags more) {
         return ImGui::InputTextMultiline(label, &field, size, flags | more);
     });
-    if (lines != before) text = ends_lines_with_return(text) ? with_returns(lines) : lines;
-    return result;
+    if (lines == before) return false;
+    text = with_lines(text, before, lines);
+    return true;
 }
 
 void keep_clipboard_apart() {

@@ -20,12 +20,16 @@ std::string text_of_field(std::string_view field);
 // Returns the character that stands for one that is typed.
 unsigned field_character(unsigned code);
 
+// A field that has the caret holds its own copy of a text, and Ctrl+Z in it its own way back: when the text is changed meanwhile by
+// something else, by undo, another file or another program, the field is left, and both are forgotten.
+
 // As ImGui::InputText() or, with a hint, InputTextWithHint(). Only what the user does changes `text`; one that no field can
-// hold, as it has a byte of 0, is read-only.
+// hold, as it has a byte of 0 or is no UTF-8, is read-only.
 bool input_text(const char* label, std::string& text, const char* hint = nullptr,
                 ImGuiInputTextFlags flags = 0);
 
-// As ImGui::InputTextMultiline(); lines that are added end as the first one does.
+// As ImGui::InputTextMultiline(), but returns whether the text was changed. Lines keep their ends; what is added has those of
+// the first line.
 bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGuiInputTextFlags flags = 0);
 
 // Has the clipboard hold texts and not their fields. To be called once, when the backend has set its own functions.

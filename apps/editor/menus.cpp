@@ -320,10 +320,9 @@ void text_panel(Editor& editor) {
         editor.text_version = editor.document->version();
     }
     const float below = count > 0 ? std::min(14 * em, 0.4f * ImGui::GetContentRegionAvail().y) : 0;
-    input_lines("##text", editor.text_buffer,
-                ImVec2(-1, ImGui::GetContentRegionAvail().y - below - (count > 0 ? 6 : 0)),
-                ImGuiInputTextFlags_AllowTabInput);
-    if (editor.text_buffer != editor.document->text()) {
+    if (input_lines("##text", editor.text_buffer,
+                    ImVec2(-1, ImGui::GetContentRegionAvail().y - below - (count > 0 ? 6 : 0)),
+                    ImGuiInputTextFlags_AllowTabInput)) {
         attempt(editor, [&] { editor.document->edit(editor.text_buffer, "Type", "text"); });
         editor.text_version = editor.document->version();
     }

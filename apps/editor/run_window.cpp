@@ -16,8 +16,8 @@ namespace fs = std::filesystem;
 void start_run(Editor& editor) {
     auto run = std::make_unique<BackgroundRun>();
     BackgroundRun& state = *run;
-    state.folder = fs::path("out") / editor.shown_scene->name;
-    state.thread = std::thread([&state, scene = *editor.shown_scene,
+    state.folder = fs::path("out") / editor.document->scene()->name;
+    state.thread = std::thread([&state, scene = *editor.document->scene(),
                                 file = editor.document->path().string()] {
         std::string result, failure;
         try {
@@ -62,10 +62,11 @@ void run_window(Editor& editor) {
             "Simulates the whole scene as it stands and writes density grids, pictures and statistics, "
             "as `nephos run` does.");
         ImGui::Spacing();
-        if (!editor.shown_scene) {
+        const bool is_sound = editor.document->scene() && editor.document->problems().empty();
+        if (!editor.run && !is_sound) {
             ImGui::TextWrapped("The scene has problems: they come first.");
         } else if (!editor.run) {
-            ImGui::Text("into out/%s", editor.shown_scene->name.c_str());
+            ImGui::Text("into out/%s", editor.document->scene()->name.c_str());
             if (button(editor, "Start the run")) attempt(editor, [&] { start_run(editor); });
         } else {
             const std::scoped_lock lock(editor.run->mutex);

@@ -54,6 +54,14 @@ Function* symbol(const char* name) {
     return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
 }
 
+// What is done when the X server goes away, which Xlib ends the program for.
+std::function<void()> when_lost;
+
+int on_lost_display(void*) {
+    if (when_lost) when_lost();
+    std::_Exit(int(ErrorCode::gpu));
+}
+
 // Dots an inch of an X server over 96 where nobody has set Xft.dpi, which is all that GLFW asks for; 1 elsewhere. By
 // name, so that a GLFW for another window system does as well, and X11's headers are not needed.
 float x_server_scale() {
@@ -144,6 +152,10 @@ struct Window::Impl {
           frame(gpu),
           picture(gpu) {
         glfwSetWindowUserPointer(handle.window, this);
+        when_lost = options.lost;
+        using Handler = int(void*);
+        if (const auto set_handler = symbol<Handler*(Handler*)>("XSetIOErrorHandler"))
+            set_handler(&on_lost_display);
         glfwSetDropCallback(handle.window, [](GLFWwindow* window, int count, const char** paths) {
             auto& self = *static_cast<Impl*>(glfwGetWindowUserPointer(window));
             for (int n = 0; n < count; ++n) self.dropped.emplace_back(paths[n]);
@@ -179,6 +191,7 @@ struct Window::Impl {
         }
         ImGui_ImplVulkan_Shutdown();
         ImGui_ImplGlfw_Shutdown();
+        when_lost = {};
     }
 
     std::array<int, 2> size() const {

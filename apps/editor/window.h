@@ -10,6 +10,7 @@
 //     }
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,6 +25,7 @@ struct WindowOptions {
     std::string device;       // part of a Vulkan device's name; empty: a graphics card if there is one
     bool validation = false;  // under the Khronos validation layer
     bool visible = true;
+    std::function<void()> lost = {};  // called when the display goes away; then the program ends, status 4
 };
 
 // Pixels of the window, 4 bytes each, row 0 at the top.

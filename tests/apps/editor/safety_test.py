@@ -13,7 +13,7 @@ import unittest
 
 from PIL import Image, ImageChops, ImageStat
 
-from case import NEPHOS, Case
+from case import NEPHOS, Case, Screen
 
 MODELS = """name = "models"
 seed = 4
@@ -106,6 +106,25 @@ class Safety(Case):
                 wait 0.5
                 """)
             self.assertEqual(scene.read_bytes().decode(), text.replace("\ue000\r", "\ue000q\r") if more else text)
+        # Other lines keep their ends, and what is no UTF-8 cannot be typed into.
+        for content, typed in ((b"seed = 1\n# a\r\n# b\n", b"seed = 1q\n# a\r\n# b\n"), (b"seed = 1 # caf\xe9\n[lattice]\n", None)):
+            scene.write_bytes(content)
+            self.edit(scene, script="""
+                wait 1
+                click tab Text
+                wait 0.3
+                click-at text 0.6 0.02
+                wait 0.5
+                key END
+                type q
+                wait 0.5
+                click tab View
+                wait 0.5
+                key CTRL+S
+                wait 0.5
+                """)
+            self.assertEqual(scene.read_bytes(), typed or content)
+        scene.write_text(text, encoding="utf-8", newline="")
         self.edit(scene, script="""
             wait 1
             click scene
@@ -120,6 +139,81 @@ class Safety(Case):
             wait 0.5
             """)
         self.assertEqual(tomllib.loads(scene.read_bytes().decode())["name"], "m\U0001f329xy")
+
+    def test_a_field_forgets_a_text_that_something_else_changed(self):
+        """ImGui's fields have a copy of the text, and undo of their own: neither comes back over another text."""
+        scene = self.folder / "a.toml"
+        text = 'seed = 4\nname = "small"\n[lattice]\ncells = [16, 14, 8]\n'
+        # The document's undo, with the field's way back behind it.
+        for place in ("0.5", "0.01"):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script=f"""
+                wait-step 1
+                click tab Text
+                wait 0.3
+                click-at text 0.6 {place}
+                wait 0.3
+                key END
+                type xyz
+                wait 0.3
+                click tab View
+                wait 0.3
+                key CTRL+Z
+                wait 0.5
+                click tab Text
+                wait 0.3
+                click-at text 0.6 {place}
+                wait 0.3
+                key CTRL+Z
+                wait 0.3
+                key CTRL+S
+                wait 0.5
+                """)
+            self.assertEqual(scene.read_text(encoding="utf-8"), text)
+        # Another program, while the caret is in the text.
+        script = self.folder / "script.txt"
+        script.write_text("wait-step 1\nclick tab Text\nwait 0.3\nclick-at text 0.6 0.5\nwait 0.5\nhashes ready.txt\nwait 4\nkey CTRL+S\nwait 1\n",
+                          encoding="utf-8")
+        editor = subprocess.Popen([*self.command(scene), "--script", str(script)], cwd=self.folder, env=self.environment,
+                                  stderr=subprocess.PIPE, text=True)
+        self.wait_for(self.folder / "ready.txt", editor)
+        other = text.replace("seed = 4", "seed = 77")
+        scene.write_text(other, encoding="utf-8")
+        _, said = editor.communicate(timeout=120)
+        self.assertEqual(editor.returncode, 0, said)
+        self.assertEqual(scene.read_text(encoding="utf-8"), other)
+
+    def test_a_run_of_a_text_with_problems(self):
+        """It is not that of the scene before, which the window still shows."""
+        scene = self.models()
+        said = self.edit(scene, status=1, script="""
+            wait-step 1
+            click tab Text
+            click text
+            key CTRL+A
+            type q=
+            wait 0.3
+            click tab View
+            key CTRL+R
+            wait 0.5
+            click "Start the run"
+            """)
+        self.assertIn("no control 'Start the run'", said)
+        self.assertFalse((self.folder / "out").exists())
+
+    def test_a_display_that_goes_away_keeps_the_edits(self):
+        scene = self.models()
+        script = self.folder / "script.txt"
+        script.write_text("wait-step 1\nclick sun\nset sun.elevation_deg 21\nwait 0.3\nhashes ready.txt\nwait 100\n", encoding="utf-8")
+        screen = Screen()
+        editor = subprocess.Popen([NEPHOS, "edit", str(scene), "--size", "1280x800", "--script", str(script)], cwd=self.folder,
+                                  env={**self.environment, "DISPLAY": screen.display}, stderr=subprocess.PIPE, text=True)
+        self.wait_for(self.folder / "ready.txt", editor)
+        screen.close()
+        _, said = editor.communicate(timeout=60)
+        self.assertEqual(editor.returncode, 4, said)
+        self.assertIn("the display is gone; unsaved edits are kept", said)
+        self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
 
     def test_every_new_element_is_valid(self):
         """What a `+` of the outline writes needs no hand in the text."""
