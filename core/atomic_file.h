@@ -30,7 +30,7 @@ enum class Folders {
 };
 
 // A file that is written under a temporary name until it is complete. write_atomically() and the functions below it use
-// one. It holds its folder open: whatever else is given the folder's name meanwhile gets no file.
+// one. It holds its folder open: no file is renamed into another one that gets the folder's name meanwhile.
 class AtomicFile {
   public:
     // Creates an empty temporary file whose name nobody can foresee beside `path`; missing parent folders as `folders` has

@@ -288,10 +288,10 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const 
         refuse(folder,
                fmt::format("the folder holds a manifest.json that is not of a run ({})", reason.what()));
     }
-    const auto is_there = [&](const std::filesystem::path& file) {
+    const auto is_listed = [&](const std::filesystem::path& file) {
         return std::ranges::count(files, file) > 0;
     };
-    if (is_there(folder.statistics()) && !is_statistics(folder.statistics()) &&
+    if (is_listed(folder.statistics()) && !is_statistics(folder.statistics()) &&
         !is_begun_statistics(folder.statistics())) {
         refuse(folder, "the folder holds a statistics.csv that is not of a run");
     }
@@ -312,7 +312,7 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const 
         refuse(folder, fmt::format("it holds a complete run for {}, not all of which would be made again",
                                    range_text(earlier)));
     }
-    if (!is_there(folder.checkpoint())) return;
+    if (!is_listed(folder.checkpoint())) return;
     if (!is_checkpoint(folder.checkpoint())) {
         refuse(folder, "the folder holds a checkpoint.nephos that is not of a run");
     }

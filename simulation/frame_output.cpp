@@ -56,9 +56,9 @@ void FrameOutput::finish_quietly() noexcept {
     }
 }
 
-void FrameOutput::finish_video(const std::function<bool()>& stop) {
+void FrameOutput::finish_video() {
     if (!video_) return;
-    video_->finish(stop);
+    video_->finish();
     video_.reset();
 }
 

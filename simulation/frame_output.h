@@ -59,10 +59,10 @@ class FrameOutput {
     void finish_quietly() noexcept;
 
     // Makes the video of the frames from now on (run_video.h); call it before the first add().
-    void start_video() { video_.emplace(settings_); }
+    void start_video(std::function<bool()> stop) { video_.emplace(settings_, std::move(stop)); }
     bool makes_video() const { return video_.has_value(); }
-    // Completes the video, if one was started; `stop` as VideoWriter::finish(). Precondition: finish(). Throws Error(io).
-    void finish_video(const std::function<bool()>& stop);
+    // Completes the video, if one was started. Precondition: finish(). Throws Error(io).
+    void finish_video();
 
   private:
     struct Drawn {

@@ -127,7 +127,7 @@ bool encode(const Simulation& simulation, RunRecorder& recorder, const RunSettin
     if (!recorder.makes_video()) return true;
     report_progress(observer, simulation, recorder, settings, "encoding");
     try {
-        recorder.finish_video(observer.stop);
+        recorder.finish_video();
     } catch (const Error&) {
         // Whoever stops the run may have ended ffmpeg too; then resuming encodes.
         if (!stopped(observer)) throw;
@@ -242,6 +242,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     const std::uint64_t first_step = simulation.steps_taken();
     if (settings.resume) {
         recorder.take_over(simulation);
+        // Before later rows are cut off the tables that it lists.
         if (!simulation.finished()) recorder.write_manifest(false, seconds_since(begin));
     } else if (settings.branch) {
         recorder.begin_branch(simulation);
@@ -249,7 +250,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         remove_earlier_run(folder);
         recorder.begin();
     }
-    recorder.start_video(simulation);
+    recorder.start_video(simulation, observer.stop);
     const bool was_complete =
         settings.resume && simulation.finished() && read_manifest(folder.manifest()).complete;
     if (was_complete && settings.checkpoint && !recorder.makes_video()) {

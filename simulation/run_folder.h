@@ -103,7 +103,8 @@ struct RunProgress {
 
 struct RunObserver {
     std::function<void(const RunProgress&)> progress;  // may be empty
-    // Asked between pieces of work; true ends the run with a checkpoint. May be empty.
+    // Asked between pieces of work, and by any thread while it waits for ffmpeg; true ends the run with a checkpoint. May be
+    // empty.
     std::function<bool()> stop;
 };
 

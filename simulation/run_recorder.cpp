@@ -83,6 +83,7 @@ void RunRecorder::take_over(const Simulation& simulation) {
             state_.frames.push_back({number, time_s, step, hash, {}});
         }
     };
+    const PublishCheck check(guard_);
     const EarlierRun earlier = read_manifest(folder_.manifest());
     require_tables_of_run(folder_, earlier, kStartAnew);
     // Frames before the first row of their step cannot be: a range of frames reports every step from 0.
@@ -165,13 +166,13 @@ void RunRecorder::write_manifest(bool complete, double wall_s) {
     hash_saved_ = state_.state_hash;
 }
 
-void RunRecorder::start_video(const Simulation& simulation) {
+void RunRecorder::start_video(const Simulation& simulation, std::function<bool()> stop) {
     if (!settings_.render || !wants_video(settings_.scene)) return;
     std::error_code error;
     if (simulation.next_frame() <= settings_.range.last_frame &&
         !std::filesystem::remove(folder_.video(), error) && error)
         throw Error(ErrorCode::io, folder_.video().string() + ": cannot remove: " + error.message());
-    if (!std::filesystem::exists(folder_.video())) output_.start_video();
+    if (!std::filesystem::exists(folder_.video())) output_.start_video(std::move(stop));
 }
 
 std::vector<RunFiles> RunRecorder::frame_files() const {

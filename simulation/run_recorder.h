@@ -68,10 +68,11 @@ class RunRecorder : public SimulationSink {
     // The files are as they should be, and stay.
     void leave_complete() { state_.complete = true; }
 
-    // The video of all frames, unless it is there already. One of a shorter run is made anew.
-    void start_video(const Simulation& simulation);
+    // The video of all frames, unless it is there already. One of a shorter run is made anew. `stop` as
+    // VideoOptions::stop.
+    void start_video(const Simulation& simulation, std::function<bool()> stop);
     bool makes_video() const { return output_.makes_video(); }
-    void finish_video(const std::function<bool()>& stop) { output_.finish_video(stop); }
+    void finish_video() { output_.finish_video(); }
 
     std::vector<RunFiles> frame_files() const;
 

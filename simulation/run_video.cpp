@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/run_video.h"
 
+#include <utility>
+
 #include <tbb/global_control.h>
 
 #include "core/error.h"
 
 namespace nephos {
 
-RunVideo::RunVideo(const RunSettings& settings)
+RunVideo::RunVideo(const RunSettings& settings, std::function<bool()> stop)
     : folder_{settings.folder, settings.scene.name},
       frames_per_second_(settings.scene.frames.per_second),
       first_(settings.range.first_frame),
       next_(settings.range.first_frame),
-      last_(settings.range.last_frame) {}
+      last_(settings.range.last_frame),
+      stop_(std::move(stop)) {}
 
 void RunVideo::write(const Rgb8Image& image) {
     if (!writer_) {
@@ -22,6 +25,7 @@ void RunVideo::write(const Rgb8Image& image) {
         options.frames_per_second = frames_per_second_;
         using Control = tbb::global_control;  // as many processors as threads of ours
         options.processors = int(Control::active_value(Control::max_allowed_parallelism));
+        options.stop = stop_;
         writer_.emplace(folder_.video(), options);
     }
     writer_->add(image.rgb);
@@ -44,9 +48,9 @@ void RunVideo::add(int number, const Rgb8Image& image) {
     }
 }
 
-void RunVideo::finish(const std::function<bool()>& stop) {
+void RunVideo::finish() {
     read_back(last_ + 1);
-    writer_->finish(stop);
+    writer_->finish();
     writer_.reset();
 }
 

@@ -15,15 +15,15 @@ namespace nephos {
 
 class RunVideo {
   public:
-    // Begins with the frames of the range. ffmpeg is started with the first of them.
-    explicit RunVideo(const RunSettings& settings);
+    // Begins with the frames of the range. ffmpeg is started with the first of them. `stop` as VideoOptions::stop.
+    RunVideo(const RunSettings& settings, std::function<bool()> stop);
 
     // Takes the picture of a frame that has been drawn; frames come in order. A failure ends the video and not the
     // run: finish() then makes it of the PNG files, and throws what fails again.
     void add(int number, const Rgb8Image& image);
-    // Reads back the frames up to the last that were not added, and completes the file. `stop` as VideoWriter::finish().
-    // Throws as VideoWriter and read_png().
-    void finish(const std::function<bool()>& stop);
+    // Reads back the frames up to the last that were not added, and completes the file. Throws as VideoWriter
+    // and read_png().
+    void finish();
 
   private:
     void read_back(int end);
@@ -33,6 +33,7 @@ class RunVideo {
     double frames_per_second_ = 25;
     int first_ = 1, next_ = 1, last_ = 0;
     bool failed_ = false;  // in add()
+    std::function<bool()> stop_;
     std::optional<VideoWriter> writer_;
 };
 

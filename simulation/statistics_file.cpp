@@ -97,7 +97,7 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
 
 void require_table_of_run(const std::filesystem::path& path, const FileDigest& saved, std::string_view cure) {
     const FileDigest found = file_digest(path, saved.bytes);
-    if (found.bytes == saved.bytes && found.xxh3 != saved.xxh3)
+    if (found != saved)
         throw Error(ErrorCode::io,
                     fmt::format("{}: does not begin with the {} bytes that the run had written: it was "
                                 "changed, or is of another run{}",
@@ -141,9 +141,6 @@ StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::ui
     const std::uint64_t size = read_statistics(path, steps, add_row, header, kStartAnew);
     if (!is_same_file(file.get(), path))  // what is cut is what was read
         throw Error(ErrorCode::io, path.string() + ": was removed or replaced while it was read");
-    struct stat status {};
-    const bool is_whole = ::fstat(file.get(), &status) == 0 && std::uint64_t(status.st_size) == size;
-    if (!is_whole && ::ftruncate(file.get(), off_t(size)) != 0) fail(path, errno);
     return StatisticsFile(path, std::move(file), size, std::move(digest));
 }
 
@@ -159,7 +156,15 @@ void StatisticsFile::save() {
         throw Error(ErrorCode::io, path_.string() + ": was removed or replaced while the run was writing it");
 }
 
+void StatisticsFile::cut() {
+    struct stat status {};
+    const bool is_whole = ::fstat(file_.get(), &status) == 0 && std::uint64_t(status.st_size) == size_;
+    if (!is_whole && ::ftruncate(file_.get(), off_t(size_)) != 0) fail(path_, errno);
+    is_cut_ = true;
+}
+
 void StatisticsFile::write_out() {
+    if (!is_cut_) cut();
     if (const int error = write_all(file_.get(), std::as_bytes(std::span(gathered_)))) {
         // Half a row may be in the file. Should taking it away fail too, resume() does it.
         [[maybe_unused]] const int ignored = ::ftruncate(file_.get(), off_t(size_));

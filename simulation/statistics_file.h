@@ -42,8 +42,7 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
                               std::string_view cure = {});
 
 // Throws Error(io) unless the file begins with the bytes that a run had written when it saved: otherwise it was edited, or is of
-// another run. A file that is shorter passes: a run that goes on from an earlier checkpoint cuts it. The message ends with
-// `cure`.
+// another run. The message ends with `cure`.
 void require_table_of_run(const std::filesystem::path& path, const FileDigest& saved,
                           std::string_view cure = {});
 
@@ -65,7 +64,8 @@ class StatisticsFile {
     // leaves none without its header. Throws Error(io).
     static StatisticsFile create(const std::filesystem::path& path,
                                  std::string_view header = kStatisticsHeader);
-    // Opens the file as read_statistics() has checked it, later rows cut off. Throws Error(io).
+    // Opens the file as read_statistics() has checked it. Later rows are cut off when the first new one is written or with
+    // save(): until then the manifest, which has the checksum of all of them, can be written anew. Throws Error(io).
     static StatisticsFile resume(const std::filesystem::path& path, std::uint64_t steps,
                                  const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
 
@@ -80,11 +80,13 @@ class StatisticsFile {
   private:
     StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size, Digest digest);
     void write_out();
+    void cut();
 
     std::filesystem::path path_;
     Descriptor file_;
     std::uint64_t size_ = 0;  // bytes in the file
     Digest digest_;           // of these
+    bool is_cut_ = false;     // nothing is behind them
     std::string gathered_;    // rows that are not in the file yet
 };
 

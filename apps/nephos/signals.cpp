@@ -44,8 +44,10 @@ void on_stop(int signal) {
 
 // The Python module names itself there: what it calls ends with it, as by SIGTERM, however it ends.
 void end_with_caller() {
-    const char* caller = std::getenv("NEPHOS_CALLER");
-    if (caller == nullptr || std::to_string(::getppid()) != caller) return;
+    const char* const variable = std::getenv("NEPHOS_CALLER");
+    if (variable == nullptr) return;
+    const std::string caller = variable;
+    ::unsetenv("NEPHOS_CALLER");
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (std::to_string(::getppid()) != caller) ::raise(SIGTERM);  // it had ended before
 }

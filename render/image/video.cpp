@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sched.h>
 #include <spawn.h>
 #include <sys/mman.h>
@@ -50,7 +51,8 @@ Descriptor opened(const std::filesystem::path& file, const std::filesystem::path
 class Encoder {
   public:
     // `output` becomes the command's descriptor kOutput.
-    Encoder(const std::vector<std::string>& command, const Descriptor& output, int processors) {
+    Encoder(const std::vector<std::string>& command, const Descriptor& output, const VideoOptions& options)
+        : stop_(options.stop) {
         int ends[2];
         if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
             fail_system("cannot start ffmpeg", errno);
@@ -60,7 +62,7 @@ class Encoder {
         progress_.reset(::memfd_create("ffmpeg-progress", MFD_CLOEXEC));
         if (messages_.get() < 0 || progress_.get() < 0) fail_system("cannot start ffmpeg", errno);
         spawn(command, theirs.get(), output.get());
-        if (processors > 0) keep_to(processors);
+        if (options.processors > 0) keep_to(options.processors);
     }
     Encoder(const Encoder&) = delete;
     Encoder& operator=(const Encoder&) = delete;
@@ -75,7 +77,14 @@ class Encoder {
     // False when the command has stopped reading: finish() then says why.
     bool write(std::span<const std::uint8_t> bytes) {
         while (!bytes.empty()) {
-            const ssize_t sent = ::send(ours_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+            const ssize_t sent = ::send(ours_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+            if (sent < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
+                require_going_on();
+                constexpr int kLook_ms = 100;
+                pollfd ours{ours_.get(), POLLOUT, 0};
+                ::poll(&ours, 1, kLook_ms);
+                continue;
+            }
             if (sent < 0 && errno == EINTR) continue;
             if (sent < 0) return false;
             bytes = bytes.subspan(std::size_t(sent));
@@ -85,11 +94,11 @@ class Encoder {
 
     // Ends the input and waits. Throws Error(io) unless the command succeeded and says that it encoded `frames`: some
     // take an input that cannot be read for one that ends.
-    void finish(std::size_t frames, const std::function<bool()>& stop) {
+    void finish(std::size_t frames) {
         ours_.close();
         constexpr auto kLook = std::chrono::milliseconds(10);
-        while (stop && is_running()) {
-            if (stop()) throw Error(ErrorCode::io, "ffmpeg was stopped before it had ended");
+        while (stop_ && is_running()) {
+            require_going_on();
             std::this_thread::sleep_for(kLook);
         }
         const std::optional<int> end = wait();
@@ -153,6 +162,10 @@ class Encoder {
         ::sched_setaffinity(child_, sizeof allowed, &allowed);
     }
 
+    void require_going_on() const {
+        if (stop_ && stop_()) throw Error(ErrorCode::io, "ffmpeg was stopped before it had ended");
+    }
+
     bool is_running() const {
         siginfo_t info{};
         return ::waitid(P_PID, id_t(child_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
@@ -194,6 +207,7 @@ class Encoder {
         return message.empty() ? "no message" : message;
     }
 
+    std::function<bool()> stop_;
     pid_t child_ = -1;
     Descriptor ours_, messages_, progress_;
 };
@@ -247,15 +261,12 @@ void require_ffmpeg() {
 
 struct VideoWriter::Impl {
     Impl(const std::filesystem::path& to, const VideoOptions& o)
-        : path(to),
-          options(o),
-          file(to),
-          encoder(command_line(o), opened(file.temporary(), to), o.processors) {}
+        : path(to), options(o), file(to), encoder(command_line(o), opened(file.temporary(), to), o) {}
 
     // Throws Error(io), with ffmpeg's message where it left one.
-    void finish_encoder(const std::function<bool()>& stop = {}) {
+    void finish_encoder() {
         try {
-            encoder.finish(frames, stop);
+            encoder.finish(frames);
         } catch (const Error& error) {
             throw Error(ErrorCode::io, path.string() + ": " + error.what());
         }
@@ -284,10 +295,10 @@ void VideoWriter::add(std::span<const std::uint8_t> rgb) {
     throw Error(ErrorCode::io, impl_->path.string() + ": ffmpeg stopped reading before the last frame");
 }
 
-void VideoWriter::finish(const std::function<bool()>& stop) {
+void VideoWriter::finish() {
     if (impl_->frames == 0)
         throw Error(ErrorCode::usage, impl_->path.string() + ": a video needs at least one frame");
-    impl_->finish_encoder(stop);
+    impl_->finish_encoder();
     impl_->file.publish();
 }
 

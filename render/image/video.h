@@ -17,6 +17,8 @@ struct VideoOptions {
     double frames_per_second = 25;  // > 0, at most 1000
     int quality = 18;               // constant rate factor of x264, 0 (lossless) .. 51
     int processors = 0;             // on which ffmpeg may run, >= 0; 0: all. Without effect on the file
+    // Asked often while ffmpeg is waited for, by the thread that waits; true ends ffmpeg, and the call with Error(io).
+    std::function<bool()> stop = {};
 };
 
 // Throws Error(io), with the package to install, when there is no ffmpeg command on the PATH. To be called
@@ -37,9 +39,9 @@ class VideoWriter {
     // Takes one frame: 3 * width * height bytes, RGB, row 0 at the top. Waits while ffmpeg is behind. Throws
     // Error(usage) on another size, Error(io) with ffmpeg's message when it has failed.
     void add(std::span<const std::uint8_t> rgb);
-    // Waits for ffmpeg and gives the file its name. `stop` is asked meanwhile, often; true ends ffmpeg. Throws Error(usage)
-    // when there was no frame, Error(io) as add(), and when it was stopped.
-    void finish(const std::function<bool()>& stop = {});
+    // Waits for ffmpeg and gives the file its name. Throws Error(usage) when there was no frame, Error(io) as
+    // add().
+    void finish();
 
   private:
     struct Impl;

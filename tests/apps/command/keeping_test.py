@@ -137,6 +137,12 @@ class Keeping(Case):
         self.kept("mixed", 3, "run", self.scene, "--seed", 3, *later, "--out", "mixed", "--resume",
                   says="mixed/statistics.csv: does not begin with the")
         self.kept("mixed", 3, "run", "--from", "mixed", *later, "--out", "no", says="or is of another run")
+        # Also one that is shorter, and one without a digit.
+        whole = (self.folder / "a/statistics.csv").read_bytes()
+        for table in (whole[:-3], whole[:-3] + b"\n", whole.replace(b",", b"", 1), whole[:whole.rindex(b"\n", 0, -1) + 1]):
+            (self.folder / "mixed/statistics.csv").write_bytes(table)
+            self.kept("mixed", 3, "run", self.scene, "--seed", 3, *later, "--out", "mixed", "--resume", says="does not begin with the")
+            self.kept("mixed", 3, "run", "--from", "mixed", *later, "--out", "no", says="does not begin with the")
         shutil.copy(self.folder / "a/checkpoint.nephos", self.folder / "b/early.nephos")
         self.kept("b", 3, "run", self.scene, "--seed", 3, "--from", "b/early.nephos", *later, "--out", "no",
                   says="b/early.nephos: is not of the run in the folder that it lies in")

@@ -532,8 +532,8 @@ class Threads(Case):
     def test_a_sweep_ends_with_python(self):
         """However that ends: a sweep that nobody waits for would keep its folder from the next one."""
         script = self.write("sweep.py", f"""
-import nephos
-nephos.sweep({str(FAIR)!r}, {{"field.background.ext": [0.1, 0.11, 0.12, 0.13]}}, replicates=50, steps=(20000, 20000), workers=2, out="out")
+import nephos, sys
+nephos.sweep({str(FAIR)!r}, {{"field.background.ext": [0.1, 0.11, 0.12, 0.13]}}, replicates=50, steps=(20000, 20000), workers=2, out=sys.argv[1])
 """)
         def is_at_work(process):
             try:
@@ -542,8 +542,8 @@ nephos.sweep({str(FAIR)!r}, {{"field.background.ext": [0.1, 0.11, 0.12, 0.13]}},
                 return False
 
         for number in (signal.SIGTERM, signal.SIGKILL):
-            python = subprocess.Popen([sys.executable, script], cwd=self.folder)
-            while not any((self.folder / "out").glob("shards/*.jsonl")):
+            python = subprocess.Popen([sys.executable, script, f"out{number}"], cwd=self.folder)
+            while not any((self.folder / f"out{number}").glob("shards/*.jsonl")):
                 self.assertIsNone(python.poll())
                 time.sleep(0.05)
             python.send_signal(number)
