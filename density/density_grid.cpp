@@ -290,6 +290,24 @@ std::vector<float> DensityGrid::to_dense() const {
     return dense;
 }
 
+void DensityGrid::visit_blocks(const std::function<void(const VoxelBlock&)>& visit) const {
+    const Extent extent = impl_->extent;
+    std::array<float, kBlockVoxels> values{};
+    for (const Block& block : blocks_of(*this)) {
+        const std::array<int, 3> low{block.origin.x(), block.origin.y(), block.origin.z()};
+        const std::array<int, 3> size{std::min(kBlock, extent.x - low[0]),
+                                      std::min(kBlock, extent.y - low[1]),
+                                      std::min(kBlock, extent.z - low[2])};
+        std::size_t at = 0;
+        for (int k = 0; k < size[2]; ++k)
+            for (int j = 0; j < size[1]; ++j)
+                for (int i = 0; i < size[0]; ++i)
+                    values[at++] =
+                        block.leaf ? block.leaf->buffer().data()[leaf_offset(i, j, k)] : block.tile;
+        visit({low, size, std::span(values).first(at)});
+    }
+}
+
 std::size_t DensityGrid::memory_bytes() const { return impl_->grid->memUsage(); }
 
 }  // namespace nephos

@@ -13,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -28,6 +29,12 @@ struct VoxelBox {
 
     bool empty() const { return min[0] > max[0] || min[1] > max[1] || min[2] > max[2]; }
     bool operator==(const VoxelBox&) const = default;
+};
+
+// The voxels of a part of a grid, x fastest; `low` as VoxelBox.
+struct VoxelBlock {
+    std::array<int, 3> low{}, size{};
+    std::span<const float> values;
 };
 
 class DensityGrid {
@@ -58,6 +65,9 @@ class DensityGrid {
     double sum() const;
     // Returns all extent().cells() values, x fastest; index with linear_index(extent(), i, j, k).
     std::vector<float> to_dense() const;
+    // Calls `visit` for each block of 8 x 8 x 8 voxels that has a value above 0, smaller at the far sides of the extent, one
+    // after the other: without room for the whole box.
+    void visit_blocks(const std::function<void(const VoxelBlock&)>& visit) const;
     // Returns the bytes that the voxels and the tree above them take.
     std::size_t memory_bytes() const;
 

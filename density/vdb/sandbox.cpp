@@ -184,8 +184,8 @@ class PipeReader final : public SandboxReader {
             const ssize_t got = ::read(fd_, buffer_.data(), buffer_.size());
             if (got < 0 && errno == EINTR) continue;
             if (got < 0)
-                throw std::runtime_error(std::string("cannot hear the reading process: ") +
-                                         std::strerror(errno));
+                throw std::runtime_error(std::string(kCannotRead) +
+                                         "cannot hear the reading process: " + std::strerror(errno));
             if (got == 0) throw std::runtime_error("");  // the child is gone: its status says why
             watch_for_stall_ = false;
             at_ = 0;
@@ -312,7 +312,8 @@ void attempt(std::string_view parser, const SandboxLimits& limits, std::span<con
     } catch (const std::runtime_error& error) {
         if (*error.what() != '\0') throw;
         const std::string how = process.end_within(time);
-        throw std::runtime_error(how.empty() ? "the reading process ended early" : how);
+        throw std::runtime_error(how.empty() ? std::string(kCannotRead) + "the reading process ended early"
+                                             : how);
     }
     process.kill();  // all has come: there is nothing to wait for
 }
@@ -395,6 +396,8 @@ void run_sandboxed(const std::filesystem::path& subject, std::string_view parser
         } catch (const Stalled&) {
         } catch (const Error&) {
             throw;
+        } catch (const std::bad_alloc&) {
+            throw;  // of this process
         } catch (const std::exception& error) {
             const std::string message = clamp_message(error.what());
             if (message.starts_with(kCannotRead))

@@ -5,6 +5,7 @@
 // waits for a lock that one of them held at that moment waits for ever. Private to density/vdb.
 
 #include <cstdint>
+#include <memory>
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Count.h>
@@ -12,6 +13,20 @@
 #include "density/openvdb_access.h"
 
 namespace nephos {
+
+// Returns the same grid, whose nodes one thread frees once nobody has it any more, unless another grid shares them: a tree frees
+// its own by many. Of the types that OpenVDB registers.
+template <class Grid>
+std::shared_ptr<Grid> freed_serially(std::shared_ptr<Grid> grid) {
+    Grid* const pointer = grid.get();
+    return std::shared_ptr<Grid>(pointer, [owner = std::move(grid)](Grid*) mutable {
+        openvdb::GridBase& any = *owner;
+        constexpr long kAlone = 2;  // the grid, and the pointer that is asked
+        if (any.baseTreePtr().use_count() == kAlone)
+            any.apply<openvdb::GridTypes>([](auto& typed) { typed.tree().root().clear(); });
+        owner.reset();
+    });
+}
 
 template <class Tree>
 std::uint64_t count_active(const Tree& tree) {

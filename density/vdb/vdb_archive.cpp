@@ -11,6 +11,8 @@
 #include <malloc.h>
 #include <unistd.h>
 
+#include "density/vdb/serial_tree.h"
+
 namespace nephos {
 
 using openvdb::GridBase;
@@ -120,7 +122,7 @@ void VdbArchive::read_sequence(std::int32_t count) {
     NamedGridMap by_name;
     for (std::int32_t n = 0; n < count; ++n) {
         GridDescriptor descriptor;
-        const GridBase::Ptr grid = descriptor.read(stream_);
+        const GridBase::Ptr grid = freed_serially(descriptor.read(stream_));
         readGrid(grid, descriptor, stream_);
         by_name[descriptor.uniqueName()] = grid;
         connectInstance(descriptor, by_name);
@@ -132,7 +134,7 @@ void VdbArchive::read_sequence(std::int32_t count) {
 GridBase::Ptr VdbArchive::read(std::size_t n) {
     if (!sequence_.empty()) return sequence_.at(n);
     const GridDescriptor& descriptor = entries_.at(n).descriptor;
-    const GridBase::Ptr grid = entries_[n].header->copyGridWithNewTree();
+    const GridBase::Ptr grid = freed_serially(entries_[n].header->copyGridWithNewTree());
     grid->clearMetadata();
     descriptor.seekToGrid(stream_);
     readGrid(grid, descriptor, stream_);

@@ -10,6 +10,7 @@
 
 #include <openvdb/tools/Interpolation.h>
 
+#include "core/text.h"
 #include "density/metaballs.h"
 #include "density/openvdb_access.h"
 
@@ -267,9 +268,16 @@ class Skewed {
         }
     }
 
-    // Our blocks that a leaf or tile of the file reaches, each once, in block order.
+    // Our blocks that a leaf or tile of the file reaches, each once, in block order. Throws std::runtime_error where their
+    // voxels take more than is allowed, before any is sampled.
     std::vector<Coord> blocks() const {
         std::vector<Coord> result;
+        const std::size_t most = foreign_.memory_bytes / (kBlockVoxels * sizeof(float));
+        std::size_t full = most;  // with some of them twice
+        const auto keep_each_once = [&] {
+            std::ranges::sort(result, {}, block_order);
+            result.erase(std::unique(result.begin(), result.end()), result.end());
+        };
         const auto add = [&](CoordBBox box) {
             box.intersect(foreign_.bounds);
             if (box.empty()) return;
@@ -287,15 +295,22 @@ class Skewed {
                     for (int x = first[0]; x <= last[0]; x += kBlock) result.emplace_back(x, y, z);
                 }
             }
-            if (result.size() > foreign_.memory_bytes / 64) throw std::bad_alloc();
+            if (result.size() <= full) return;
+            keep_each_once();
+            full = std::max(most, 2 * result.size());
+            if (result.size() > most)
+                throw std::runtime_error(
+                    "cannot read: its voxels are no cubes along the axes, and cubes of " +
+                    number_text(edge_, 6) + " m, " + std::to_string(extent_.x) + " x " +
+                    std::to_string(extent_.y) + " x " + std::to_string(extent_.z) +
+                    " in all, take more than the memory that is allowed");
         };
         const FloatTree& tree = foreign_.grid->tree();
         for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) add(leaf->getNodeBoundingBox());
         auto tile = tree.cbeginValueOn();
         tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
         for (; tile; ++tile) add(tile.getBoundingBox());
-        std::ranges::sort(result, {}, block_order);
-        result.erase(std::unique(result.begin(), result.end()), result.end());
+        keep_each_once();
         return result;
     }
 

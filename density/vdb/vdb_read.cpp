@@ -95,7 +95,7 @@ void check_stated_size(const openvdb::GridBase& header, std::size_t memory_bytes
 }
 
 FloatGrid::Ptr float_grid(const openvdb::GridBase& grid, const FloatTree::Ptr& tree) {
-    auto result = FloatGrid::create(tree);
+    auto result = freed_serially(FloatGrid::create(tree));
     result->setTransform(grid.transform().copy());
     return result;
 }
@@ -304,7 +304,8 @@ void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& na
         for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) {
             if (*voxel) words[voxel.pos() >> 6] |= std::uint64_t{1} << (voxel.pos() & 63);
         }
-        send(leaf->origin(), words);
+        if (std::ranges::any_of(words, [](std::uint64_t word) { return word != 0; }))
+            send(leaf->origin(), words);
     }
     std::uint64_t full[8];
     std::fill_n(full, 8, ~std::uint64_t{0});

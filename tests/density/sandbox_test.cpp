@@ -142,10 +142,10 @@ TEST(Sandbox, TimeStandsStillWhileItsReaderIsStopped) {
     ASSERT_GE(reader, 0);
     if (reader == 0) {
         SandboxLimits limits;
-        limits.seconds = 3;
+        limits.seconds = 4;
         const std::string error = error_of(
             [](SandboxWriter& writer) {
-                ::usleep(800'000);
+                ::usleep(5'500'000);  // past the time, had it not stood still
                 writer.value(1);
             },
             limits);
@@ -153,7 +153,7 @@ TEST(Sandbox, TimeStandsStillWhileItsReaderIsStopped) {
     }
     ::usleep(200'000);
     ::kill(reader, SIGSTOP);
-    ::usleep(4'000'000);
+    ::usleep(4'800'000);
     ::kill(reader, SIGCONT);
     int status = -1;
     ASSERT_EQ(::waitpid(reader, &status, 0), reader);
