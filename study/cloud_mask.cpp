@@ -63,14 +63,23 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
         fail(ErrorCode::usage, path,
              fmt::format("has voxels of {} m itself: leave out the size of cells and levels", size));
     const Extent extent = grid.extent();
-    require_memory(std::size_t(extent.cells()) * sizeof(float) + BitPlane::bytes(extent),
-                   fmt::format("{}: the box of {} x {} x {} voxels around its grid", path.string(), extent.x,
-                               extent.y, extent.z));
-    const std::vector<float> values = grid.to_dense();
-    CloudMasks masks{{}, size, size, grid.placement().origin_m.z, options.boundaries, false, 0, {}};
-    masks.snapshots.push_back(plane_of(extent, options.threshold.value_or(0), [&](int i, int j, int k) {
-        return double(values[linear_index(extent, i, j, k)]);
-    }));
+    require_memory(BitPlane::bytes(extent), fmt::format("{}: the mask of {} x {} x {} voxels around its grid",
+                                                        path.string(), extent.x, extent.y, extent.z));
+    CloudMasks masks{{}, size, size, {grid.placement().origin_m.z}, options.boundaries, false, 0, {}};
+    const double threshold = options.threshold.value_or(0);
+    BitPlane& plane = masks.snapshots.emplace_back(extent);
+    if (threshold < 0) {  // so that what is clear is cloud
+        plane = plane_of(extent, threshold, [](int, int, int) { return 0.0; });
+        return masks;
+    }
+    grid.visit_blocks([&](const VoxelBlock& block) {
+        std::size_t at = 0;
+        for (int k = 0; k < block.size[2]; ++k)
+            for (int j = 0; j < block.size[1]; ++j)
+                for (int i = 0; i < block.size[0]; ++i)
+                    if (double(block.values[at++]) > threshold)
+                        plane.set(block.low[0] + i, block.low[1] + j, block.low[2] + k, true);
+    });
     return masks;
 }
 
@@ -90,7 +99,8 @@ CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions
     const double size = cell_size(path, options);
     if (!axes.has_levels) require_no_height(path, options);
     const bool is_flat = !axes.has_levels || (extent.z == 1 && !options.level_height_m);
-    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries, is_flat, 0, {}};
+    CloudMasks masks{{}, size, options.level_height_m.value_or(size), {}, options.boundaries, is_flat, 0, {}};
+    masks.bases_m.assign(times, 0);
     if (!axes.note.empty()) masks.notes.push_back(axes.note);
     if (axes.downwards)
         masks.notes.push_back(fmt::format("the levels of the variable {} go downwards, and are turned over",
@@ -139,6 +149,8 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
     if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
         fail(ErrorCode::io, path, image.message);
     image.format = PNG_FORMAT_GRAY;
+    image.flags |=
+        PNG_IMAGE_FLAG_16BIT_sRGB;  // else 16 bits are taken for linear light, and 20,000 of 65,535 for 149 of 255
     const std::uint64_t pixels_claimed = std::uint64_t(image.width) * image.height;
     if (image.width > unsigned(kMaxExtent) || image.height > unsigned(kMaxExtent) ||
         pixels_claimed > kMostPixels) {
@@ -157,7 +169,7 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
     std::vector<png_byte> pixels(extent.cells());
     if (png_image_finish_read(&image, nullptr, pixels.data(), png_int_32(image.width), nullptr) == 0)
         fail(ErrorCode::io, path, image.message);
-    CloudMasks masks{{}, size, size, 0, options.boundaries, true, 0, {}};
+    CloudMasks masks{{}, size, size, {0}, options.boundaries, true, 0, {}};
     masks.snapshots.push_back(plane_of(
         extent, options.threshold.value_or(kGreyThreshold),
         [&](int i, int j, int) { return double(pixels[linear_index(extent, i, extent.y - 1 - j, 0)]); }));
@@ -173,11 +185,13 @@ CloudMasks read_mask(const std::filesystem::path& path, const MaskOptions& optio
     fail(ErrorCode::usage, path, "is no cloud mask by its name; expected .vdb, .nc or .png");
 }
 
-// The mean over snapshots that follow each other. They are not independent: rho, where there are enough to tell.
+// The mean over snapshots that follow each other, as of a steady run of a sweep: they are not independent. Fewer than eight do
+// not tell how much they have in common, and count as independent.
 SeriesMean mean_of(const std::vector<double>& values) {
     constexpr std::size_t kEnough = 8;
     if (std::ranges::any_of(values, [](double value) { return !std::isfinite(value); }))
         return {kNaN, kNaN, kNaN, kNaN, kNaN};
+    if (values.size() >= kEnough) return mean_over(values, {Regime::steady, 0, values.size(), 0, 0}, 1);
     const double n = double(values.size());
     double sum = 0, squares = 0;
     for (const double value : values) sum += value;
@@ -185,9 +199,7 @@ SeriesMean mean_of(const std::vector<double>& values) {
     if (values.size() < 2) return {mean, kNaN, kNaN, kNaN, n};
     for (const double value : values) squares += (value - mean) * (value - mean);
     const double deviation = std::sqrt(squares / (n - 1));
-    const double tau =
-        values.size() < kEnough ? 1 : integrated_time(autocorrelation(values, values.size() / 2));
-    return {mean, deviation * std::sqrt(tau / n), deviation, tau, n / tau};
+    return {mean, deviation / std::sqrt(n), deviation, 1, n};
 }
 
 // Throws Error(usage) where the clouds of a shadow of so many runs take more memory than there is.
@@ -272,6 +284,7 @@ CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const Mas
         all.missing += one.missing;
         all.seen_from_above = all.seen_from_above || one.seen_from_above;
         std::ranges::move(one.snapshots, std::back_inserter(all.snapshots));
+        all.bases_m.insert(all.bases_m.end(), one.bases_m.begin(), one.bases_m.end());
     }
     if (all.snapshots.empty()) throw Error(ErrorCode::usage, "no cloud mask is named");
     all.notes = notes.texts();
@@ -283,14 +296,15 @@ CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const Mas
 MaskStatistics mask_statistics(const CloudMasks& masks) {
     const Extent extent = masks.snapshots.front().extent();
     const SizeRange range = default_size_range(extent);
-    const Placement levels{{0, 0, masks.base_m}, masks.level_height_m};
     std::array<std::vector<double>, kStatistics.size()> series;
     CloudSizes sizes(range);
     OrganisationSums sums;
     const auto put = [&](std::string_view name, double value) {
         series[statistic_index(name)].push_back(value);
     };
-    for (const BitPlane& plane : masks.snapshots) {
+    for (std::size_t n = 0; n < masks.snapshots.size(); ++n) {
+        const BitPlane& plane = masks.snapshots[n];
+        const Placement levels{{0, 0, masks.bases_m[n]}, masks.level_height_m};
         require_memory_of_clouds(masks, extent, count_shadow_runs(plane.view()));
         const CloudCounts counts = count_cloud(plane.view(), masks.boundaries);
         const CloudStatistics s = cloud_statistics(counts, levels);

@@ -38,7 +38,8 @@ struct MaskOptions {
 
 struct CloudMasks {
     std::vector<BitPlane> snapshots;                         // all of one extent, in the order of time
-    double cell_size_m = 0, level_height_m = 0, base_m = 0;  // base_m: lower face of the lowest level
+    double cell_size_m = 0, level_height_m = 0;
+    std::vector<double> bases_m;  // lower face of the lowest level, of each snapshot
     Boundaries boundaries;
     bool seen_from_above = false;  // the one level stands for all of them
     std::uint64_t missing = 0;     // values of all snapshots that are missing, and count as clear

@@ -119,6 +119,7 @@ class Fitter {
         FitResult result = posterior();
         result.runs = runs_.size() + lost_;
         result.lost = lost_;
+        result.failed = failed_;
         prove(result);
         for (std::vector<double>& sample : result.posterior) sample = values_of(sample);
         result.best = values_of(result.best);
@@ -145,6 +146,7 @@ class Fitter {
     void run_wave(int wave, const std::vector<Point>& points) {
         tried_.insert(points.begin(), points.end());
         for (FitRun& run : simulate_(wave, points)) {
+            failed_ += run.failed;
             bool whole = true;
             for (std::size_t n = 0; n < transforms_.size(); ++n) {
                 run.errors[n] *= slope(transforms_[n], run.statistics[n]);
@@ -158,7 +160,7 @@ class Fitter {
                 ++lost_;
             }
         }
-        if (lost_ > runs_.size()) throw_lost();
+        if (lost_ > runs_.size() || (lost_ > 0 && runs_.size() < dimensions_ + 3)) throw_lost();
         emulate();
     }
 
@@ -170,10 +172,15 @@ class Fitter {
                                        problem_.targets[n].statistic, without_[n]);
         throw Error(
             ErrorCode::usage,
-            fmt::format("{} of {} runs have no mean of every target, or none that can be a target's (not "
-                        "steady, dead, overcast or failed): {}; give more steps, a prior without the "
-                        "regimes that jump, or another target",
-                        lost_, lost_ + runs_.size(), targets));
+            fmt::format(
+                "{} of {} runs have no mean of every target, or none that can be a target's (not "
+                "steady, dead, overcast or failed): {}; give more steps, a prior without the "
+                "regimes that jump, or another target{}",
+                lost_, lost_ + runs_.size(), targets,
+                failed_ == 0
+                    ? ""
+                    : fmt::format("; {} of them failed (failures.csv), and --retry-failed runs these again",
+                                  failed_)));
     }
 
     void emulate() {
@@ -347,20 +354,25 @@ class Fitter {
         result.best = points[best];
         result.implausibility = implausibility(points[best]);
         result.effective_samples = effective;
-        // Systematic resampling: sample n is where the sum of weights passes (n + 1/2) / kSamples.
+        // Systematic resampling: sample n is where the sum of weights passes (n + 1/2) / kSamples. In the order of the first
+        // parameter: in that of the sequence, equal distances would pick points that lie alike.
         const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
+        std::vector<std::size_t> order(points.size());
+        std::iota(order.begin(), order.end(), std::size_t(0));
+        std::ranges::sort(order, {}, [&](std::size_t n) -> const Point& { return points[n]; });
         double sum = 0;
         std::size_t at = 0;
         for (std::size_t n = 0; n < kSamples; ++n) {
             const double place = (double(n) + 0.5) / double(kSamples) * total;
-            while (at + 1 < points.size() && sum + weights[at] < place) sum += weights[at++];
-            result.posterior.push_back(points[at]);
+            while (at + 1 < points.size() && sum + weights[order[at]] < place) sum += weights[order[at++]];
+            result.posterior.push_back(points[order[at]]);
         }
         // In random order: Sobol points that are a power of two apart lie close together, and so would every hundredth.
         std::vector<double> keys = unit_points(Design::random, kSamples, 1, problem_.seed);
         for (std::size_t n = kSamples; n > 1; --n)
             std::swap(result.posterior[n - 1], result.posterior[std::size_t(keys[n - 1] * double(n))]);
         estimate(points, weights, total, result);
+        look_beside(result);
         return result;
     }
 
@@ -408,6 +420,26 @@ class Fitter {
         directions(result.best, result);
     }
 
+    // Looks for runs that met all targets where the emulators say that none can: they may miss a second solution, as in a
+    // corner of the prior that few runs of the first wave fell into.
+    void look_beside(FitResult& result) const {
+        constexpr double kMet = 2, kLeftOut = 2 * kImplausible;
+        double closest = kMet;
+        for (const FitRun& run : runs_) {
+            double worst = 0;
+            for (std::size_t n = 0; n < transforms_.size(); ++n) {
+                const FitTarget& wanted = problem_.targets[n];
+                const Emulator::Prediction of_run{run.statistics[n], run.errors[n] * run.errors[n]};
+                worst = std::max(worst, match(transforms_[n], of_run, {wanted.value, wanted.sd}).distance);
+            }
+            if (worst > kMet || implausibility(run.unit) < kLeftOut) continue;
+            ++result.left_out;
+            if (worst > closest) continue;
+            closest = worst;
+            result.left_out_at = values_of(run.unit);
+        }
+    }
+
     // Singular vectors of the Jacobian at the best point, its rows in units of what each target allows.
     void directions(const std::vector<double>& centre, FitResult& result) const {
         Eigen::MatrixXd jacobian =
@@ -447,6 +479,7 @@ class Fitter {
         result.proof = points.size();
         if (points.empty()) return;
         const std::vector<FitRun> runs = simulate_(4, points);
+        for (const FitRun& run : runs) result.failed += run.failed;
         for (std::size_t n = 0; n < transforms_.size(); ++n) {
             double sum = 0, squares = 0, count = 0;
             for (const FitRun& run : runs) {
@@ -474,7 +507,7 @@ class Fitter {
     std::vector<FitRun> runs_;    // statistics transformed
     std::set<Point> tried_;       // of all runs, those that were lost included
     std::uint64_t taken_ = 0;     // points of the Sobol sequence
-    std::uint64_t lost_ = 0;
+    std::uint64_t lost_ = 0, failed_ = 0;
     std::vector<std::uint64_t> without_;  // runs that have none of each target
     std::vector<Emulator> emulators_;
 };

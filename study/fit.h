@@ -48,6 +48,7 @@ struct FitProblem {
 // A run at a point of the unit cube (the prior's ranges): its statistics in the order of the targets; NaN where it has none.
 struct FitRun {
     std::vector<double> unit, statistics, errors;
+    bool failed = false;  // it gave nothing, as its process ended
 };
 
 // Runs points, each once. `wave` is 1, 2, 3; 4 is the proof.
@@ -80,6 +81,7 @@ struct FitResult {
     // Without the proof: fewer than were asked for where no more points are possible. Lost: without a mean (not steady, or
     // failed).
     std::uint64_t runs = 0, lost = 0;
+    std::uint64_t failed = 0;  // of all, those of the proof included
     std::uint64_t proof =
         0;  // different points of the posterior that were run afresh, at most as many as asked for
     std::vector<double> best;   // the parameters of the highest posterior density
@@ -87,6 +89,10 @@ struct FitResult {
     // Number of independent points that the weighted ones of the posterior are worth, (sum w)^2 / sum w^2; below 200 the
     // quantiles are rough.
     double effective_samples = 0;
+    // Runs that met all targets within two standard deviations of both, where the emulators leave no posterior; and the
+    // parameters of the closest.
+    std::uint64_t left_out = 0;
+    std::vector<double> left_out_at;
     std::vector<std::string>
         problems;  // of records in the folder of the fit that cannot be read (Records::problems())
 };

@@ -190,11 +190,13 @@ std::string size_text(int x, int y, const std::optional<int>& z, double cell_m, 
 bool compare_sizes(TomlTable& target, const FitTarget& to, const CloudMasks& masks, const Measured& measured,
                    std::vector<std::string>& notes) {
     if (measured.varies) return true;
-    if ((to.statistic == "base_mean_m" || to.statistic == "top_mean_m") && masks.base_m != measured.floor_m)
+    const auto other_base =
+        std::ranges::find_if(masks.bases_m, [&](double m) { return m != measured.floor_m; });
+    if ((to.statistic == "base_mean_m" || to.statistic == "top_mean_m") && other_base != masks.bases_m.end())
         notes.push_back(
             fmt::format("the lowest level of {} begins at {} m, that of {} at {} m: `{}` is compared "
                         "all the same",
-                        to.from, number_text(masks.base_m, 6), measured.scene,
+                        to.from, number_text(*other_base, 6), measured.scene,
                         number_text(measured.floor_m, 6), to.statistic));
     const Extent box = masks.snapshots.front().extent(), own = measured.extent;
     const auto differ = [](double a, double b) { return std::abs(a - b) > 1e-3 * b; };

@@ -64,6 +64,7 @@ std::vector<FitRun> runs_of(const FitOptions& options, const SweepPlan& plan, co
         FitRun& run = runs.emplace_back();
         run.unit = points[n];
         const RunRecord* record = records.find(plan.run(n).id);
+        run.failed = record != nullptr && record->failed;
         for (const FitTarget& target : options.problem.targets) {
             const SeriesMean none{std::nan(""), std::nan(""), 0, 0, 0};
             const SeriesMean& s = record == nullptr || record->failed
@@ -150,10 +151,12 @@ void write_results(const FitOptions& options, const FitResult& result, const std
                        {"runs_asked", options.problem.runs},
                        {"runs", result.runs},
                        {"lost", result.lost},
+                       {"failed", result.failed},
                        {"proof_asked", options.problem.proof},
                        {"proof", result.proof},
                        {"implausibility", number(result.implausibility)},
                        {"effective_samples", number(result.effective_samples)},
+                       {"left_out", result.left_out},
                        {"parameters", parameters},
                        {"targets", targets},
                        {"directions", directions},
@@ -176,8 +179,7 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
     require_memory_for(plan_of_ends,
                        int(std::min<std::uint64_t>(std::uint64_t(job.workers), options.problem.runs)));
     const std::string& simulation_hash = plan_of_ends.simulation_hash();
-    create_folders(job.folder);
-    const Descriptor held = folder_of_fit(job.folder);
+    Descriptor held;
     const auto require_in_place = [&] {
         if (!is_same_file(held.get(), job.folder))
             throw Error(ErrorCode::io,
@@ -191,6 +193,10 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
                         options.base.scene_file.string() +
                             ": a file that the scene names was changed after the fit began: the same "
                             "command fits with what is in it now");
+        if (held.get() < 0) {
+            create_folders(job.folder);
+            held = folder_of_fit(job.folder);
+        }
         require_in_place();
         SweepJob part = job;
         part.folder = job.folder / (wave == 4 ? "proof" : fmt::format("wave-{}", wave));
@@ -205,7 +211,8 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
     try {
         FitResult result = fit(options.problem, simulate);
         result.problems = std::move(problems);
-        require_in_place();
+        const std::function<void()> check = require_in_place;
+        const PublishCheck keeps_in_place(check);
         write_results(options, result, job.folder);
         return result;
     } catch (const Stopped&) {
@@ -242,6 +249,17 @@ std::string fit_text(const FitOptions& options, const FitResult& result) {
             "warning: the best point is {:.1f} standard deviations off a target: nothing in the prior meets "
             "them all\n",
             result.implausibility);
+    if (result.left_out > 0) {
+        std::string place;
+        for (std::size_t d = 0; d < result.left_out_at.size(); ++d)
+            place += fmt::format("{}{} {:.4g}", d == 0 ? "" : ", ", name_of(options.problem.parameters[d]),
+                                 result.left_out_at[d]);
+        text += fmt::format(
+            "warning: {} of the runs met all targets where the posterior has nothing, the closest at {}: "
+            "there may be "
+            "another solution, too narrow for so few runs to tell; give a prior about it, or a log scale\n",
+            result.left_out, place);
+    }
     if (result.effective_samples < kFewSamples)
         text += fmt::format(
             "warning: the posterior rests on {:.0f} independent points: its quantiles are rough; give "
@@ -255,6 +273,11 @@ std::string fit_text(const FitOptions& options, const FitResult& result) {
         text +=
             fmt::format("warning: {} of {} runs: no more points were found where the targets are possible\n",
                         result.runs, options.problem.runs);
+    if (result.failed > 0)
+        text += fmt::format(
+            "warning: {} runs failed: failures.csv of each wave has them with the command that repeats each, "
+            "--retry-failed runs them again\n",
+            result.failed);
     if (result.lost > 0)
         text +=
             fmt::format("warning: {} of {} runs had no mean (not steady, dead or failed) and told nothing\n",

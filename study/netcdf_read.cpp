@@ -476,7 +476,13 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
         variable.bytes = reader.count();
         variable.begin = reader.offset();
         if (!variable.dimensions.empty() && dimensions[variable.dimensions[0]].size == 0) {
-            record_bytes += variable.bytes;
+            // By dimensions and type: what is stated is redundant, and wrong in some files (classic format, note on vsize).
+            constexpr std::uint64_t kPadding = 4;
+            std::uint64_t bytes = size_of_type(variable.type, path);
+            for (std::size_t n = 1; n < variable.dimensions.size(); ++n)
+                if (__builtin_mul_overflow(bytes, dimensions[variable.dimensions[n]].size, &bytes))
+                    throw Error(ErrorCode::io, path.string() + ": is damaged");
+            record_bytes += (bytes + kPadding - 1) / kPadding * kPadding;
             ++record_variables;
         }
     }

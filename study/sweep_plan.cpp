@@ -59,12 +59,14 @@ void require_same_wind(const Scene& scene, std::size_t lattice) {
                     "same all over each level: leave out --tracks");
 }
 
-// Returns whether a sample of an axis may have a value twice: of whole numbers, and of a range with few numbers in it.
-bool has_few_values(const Axis& axis) {
-    constexpr double kMany = 4294967296.0;  // 2^32
+// Returns whether a sample of so many points may have a value of an axis twice: of whole numbers, and of a range with few
+// numbers in it. Points by chance begin to meet when they are as many as the root of these.
+bool may_meet(const Axis& axis, std::uint64_t points) {
+    constexpr double kMargin = 1000;
     const double largest = std::max(std::abs(axis.from), std::abs(axis.to));
     const double apart = std::nextafter(largest, std::numeric_limits<double>::infinity()) - largest;
-    return axis.scale == Scale::integer || !((axis.to - axis.from) / apart >= kMany);
+    return axis.scale == Scale::integer ||
+           !((axis.to - axis.from) / apart >= kMargin * double(points) * double(points));
 }
 
 // Calls `check`; an error without a place gets one, where that is known, and words before it. A failure of reading keeps its
@@ -225,7 +227,8 @@ std::vector<std::vector<std::string>> SweepPlan::check_axes() {
 void SweepPlan::require_different_points(const std::vector<std::vector<std::string>>& equals) const {
     const bool may_repeat =
         options_.design == Design::list ||
-        (is_sampled(options_.design) && std::ranges::all_of(options_.axes, has_few_values));
+        (is_sampled(options_.design) &&
+         std::ranges::all_of(options_.axes, [&](const Axis& axis) { return may_meet(axis, points_); }));
     if (!may_repeat || options_.axes.empty()) return;
     std::vector<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>> hashes;
     hashes.reserve(points_);

@@ -24,8 +24,8 @@ struct TargetMatch {
 //
 //     ((z - foretold) / its error)^2 + ((backward(z) - target) / its sd)^2
 //
-// is least, the square of the distance; the likelihood is the integral over z of the two normal densities, by Laplace's
-// method there. Where the scale is linear both are the usual ones, with the sum of the variances. Pure.
+// is least, the square of the distance; the likelihood is the integral over z of the two normal densities about there. Where
+// the scale is linear both are the usual ones, with the sum of the variances. Pure.
 TargetMatch match(Transform transform, const Emulator::Prediction& foretold, const TargetValue& target);
 
 }  // namespace nephos

@@ -56,7 +56,9 @@ int fit(const FitArguments& a) {
         return 128 + pending_signal();
     }
     print_problems(result->problems);
-    const int status = result->problems.empty() ? 0 : int(ErrorCode::io);
+    const int status = !result->problems.empty() ? int(ErrorCode::io)
+                       : result->failed > 0      ? int(ErrorCode::check)
+                                                 : 0;
     if (a.work.quiet) return status;
     Output output;
     output.write(fit_text(options, *result));
@@ -99,6 +101,8 @@ void add_fit_command(CLI::App& app, Action& action) {
         "  statistic = \"cover\"\n"
         "  value = 0.3\n"
         "  sd = 0.015\n"
+        "\n"
+        "Exit status 1: some runs failed, and told nothing; 3: records are damaged, and named.\n"
         "\n"
         "The same command goes on where it was stopped. docs/research.md explains the method and every key.\n"
         "\n"

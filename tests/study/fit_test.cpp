@@ -156,6 +156,33 @@ TEST(Fit, ARidgeIsFoundAndNamed) {
     EXPECT_GT(high, 0.2);
 }
 
+// A target whose deviation is not small beside it: on the emulator's scale, the logit, that is no normal distribution at all.
+TEST(Fit, AWideTargetIsNormalInItsOwnUnit) {
+    for (const auto& [value, sd] : {std::pair(0.02, 0.05), std::pair(0.001, 0.03), std::pair(0.3, 0.1)}) {
+        const FitProblem problem{{kExt}, {{"cover", value, sd}}, 64, 0, 1};
+        const FitResult result = fit(problem, toy(problem, 9));
+        // Prior x likelihood, by the sum over 10,000 points.
+        std::vector<std::pair<double, double>> weights;
+        double total = 0, mean = 0;
+        for (int n = 0; n < 10'000; ++n) {
+            const double ext = parameter_value(kExt, (n + 0.5) / 10'000);
+            const double off = (null_cover(1e-3, ext) - value) / sd, weight = std::exp(-off * off / 2);
+            weights.emplace_back(ext, weight);
+            total += weight;
+            mean += weight * ext;
+        }
+        const auto quantile = [&](double q) {
+            double sum = 0;
+            for (const auto& [ext, weight] : weights)
+                if ((sum += weight) >= q * total) return ext;
+            return 0.0;
+        };
+        EXPECT_NEAR(result.parameters[0].mean, mean / total, 0.02 * mean / total) << value;
+        EXPECT_NEAR(result.parameters[0].low, quantile(0.05), 0.03 * quantile(0.05)) << value;
+        EXPECT_NEAR(result.parameters[0].high, quantile(0.95), 0.03 * quantile(0.95)) << value;
+    }
+}
+
 struct Coverage {
     int inside = 0;
     std::array<int, 5> ranks{};  // of the truth among the samples

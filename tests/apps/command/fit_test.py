@@ -3,12 +3,17 @@
 
 import csv
 import json
+import os
+import pathlib
 import re
+import signal
+import subprocess
+import time
 import unittest
 
 import xxhash
 
-from case import Case
+from case import Case, NEPHOS
 
 NULL = """\
 [lattice]
@@ -82,6 +87,23 @@ class Fit(Case):
         self.call("fit", file, "--out", ".", "-j", "2")
         self.folder = home
         self.assertEqual((self.folder / "data/fit/fitted.toml").read_bytes(), before)
+
+    def test_runs_that_failed_are_counted(self):
+        """A worker that was killed tells nothing, in a wave or in the proof: status 1, until --retry-failed."""
+        self.write("null.toml", NULL)
+        file = self.write("cover.toml", FIT.replace("runs = 32", "runs = 16"))
+        self.call("fit", file, "--out", "whole", "-j", "2")
+        process = subprocess.Popen([NEPHOS, "fit", file, "--out", "out", "-j", "1", "-q"], cwd=self.folder, env=self.environment)
+        for _ in range(1000):
+            children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            if children and any((self.folder / "out").glob("wave-1/shards/*.jsonl")):
+                os.kill(int(children[0]), signal.SIGKILL)
+                break
+            time.sleep(0.005)
+        self.assertIn(process.wait(timeout=120), (1, 2))  # too few are left, or not
+        self.call("fit", file, "--out", "out", "-j", "2", "--retry-failed")
+        for name in ("posterior.csv", "fitted.toml"):
+            self.assertEqual((self.folder / "out" / name).read_bytes(), (self.folder / "whole" / name).read_bytes())
 
     def test_the_target_that_no_run_has_is_named(self):
         """Nothing pulses without vapour."""

@@ -107,6 +107,36 @@ class Stats(Case):
         slab = self.stats("zyx.nc", "--cell-size", "20", "--level-height", "40")
         self.assertEqual((slab["seen_from_above"], slab["statistics"]["top_mean_m"]["mean"]), (False, 40))
 
+    def test_pictures_of_sixteen_bits(self):
+        """The threshold is of what a picture shows, whatever its depth: 127 of 255."""
+        for value, cover in ((20000, 0), (32000, 0), (33500, 1)):
+            Image.fromarray(numpy.full((4, 4), value, dtype=numpy.uint16)).save(self.folder / "deep.png")
+            self.assertEqual(self.stats("deep.png", "--cell-size", "30")["statistics"]["cover"]["mean"], cover, value)
+
+    def test_masks_at_different_heights(self):
+        """Each snapshot has its own lowest level: the order of files changes nothing."""
+        import pyopenvdb
+        for name, metres in (("low.vdb", 500), ("high.vdb", 1500)):
+            grid = pyopenvdb.FloatGrid()
+            grid.name = "density"
+            grid.fill((0, 0, 0), (7, 7, 3), 1.0)
+            grid.transform = pyopenvdb.createLinearTransform([[100, 0, 0, 0], [0, 100, 0, 0], [0, 0, 100, 0], [50, 50, metres + 50, 1]])
+            pyopenvdb.write(str(self.folder / name), [grid])
+        for names in (("low.vdb", "high.vdb"), ("high.vdb", "low.vdb")):
+            base = self.stats(*names)["statistics"]["base_mean_m"]
+            self.assertEqual((base["mean"], base["se"]), (1000, 500), names)
+
+    def test_a_few_voxels_far_apart(self):
+        """The box around them is held as bits alone."""
+        import pyopenvdb
+        grid = pyopenvdb.BoolGrid()
+        grid.name = "cld"
+        for corner in ((0, 0, 0), (1000, 1000, 400)):
+            grid.fill(corner, corner, True)
+        pyopenvdb.write(str(self.folder / "far.vdb"), [grid])
+        found = json.loads(self.call("stats", "far.vdb", "--json", preexec_fn=lambda: limit_addresses(1500 << 20)).stdout)
+        self.assertAlmostEqual(found["statistics"]["cover"]["mean"], 2 / 1001 ** 2)
+
     def test_every_statistic_has_a_place(self):
         """Also where it has no value."""
         self.netcdf("a.nc", random_mask(7, (3, 20, 30), 0.05) * 1.0, ("z", "y", "x"))
@@ -288,11 +318,11 @@ class Stats(Case):
         grid = pyopenvdb.FloatGrid()
         grid.name = "density"
         accessor = grid.getAccessor()
-        for place in ((0, 0, 0), (900, 900, 900)):
+        for place in ((0, 0, 0), (3000, 3000, 3000)):
             accessor.setValueOn(place, 1.0)
         pyopenvdb.write(str(self.folder / "far.vdb"), [grid])
         self.refused(2, "stats", "far.vdb", preexec_fn=lambda: limit_addresses(2500 << 20),
-                     says="far.vdb: the box of 901 x 901 x 901 voxels around its grid takes about 2.")
+                     says="far.vdb: the mask of 3001 x 3001 x 3001 voxels around its grid takes about 3.")
 
     def test_heads_of_netcdf_are_read_once_and_limited(self):
         """A head of CDF-1 with a variable of 1,024 times the same dimension, whose coordinate has many attributes; one of more
