@@ -2,12 +2,17 @@
 #include "simulation/scene_files.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <span>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "automaton/grid_values.h"
 #include "core/digest.h"
+#include "core/text.h"
 #include "density/vdb/vdb_file.h"
 #include "render/image/alpha_image.h"
 #include "scenes/format/errors.h"
@@ -71,6 +76,20 @@ void add(Digest& digest, const SampleGrid& grid) {
     digest.add(std::as_bytes(std::span(grid.values)));
 }
 
+// Throws Error(usage) where the wind of a file moves the air further in a step than the automaton can follow.
+void require_speed(const Scene& scene, const SampleGrid& samples) {
+    double cell_m = std::numeric_limits<double>::infinity();
+    for (std::size_t n = 0; n < lattice_count(scene); ++n)
+        cell_m = std::min(cell_m, automaton_options(scene, n).placement.cell_size_m);
+    const double most_m_per_s = kMaxExtent * cell_m / scene.automaton.time_step_s;
+    for (const float value : samples.values)
+        if (!(std::abs(double(value)) <= most_m_per_s))
+            throw Error(ErrorCode::usage,
+                        fmt::format("a wind of {} m/s moves the air by more than {} cells in one step: "
+                                    "expected at most {} m/s",
+                                    number_text(value, 6), kMaxExtent, number_text(most_m_per_s, 6)));
+}
+
 }  // namespace
 
 std::string key_of_file(const Scene& scene, const std::string& list, std::size_t n) {
@@ -94,7 +113,9 @@ Scene with_files(Scene scene) {
         for (std::size_t n = field.samples.size(); n < field.files.size(); ++n)
             field.samples.push_back({field.start_s + double(n) * field.interval_s,
                                      read_at_key(scene, wind_file_key(scene, f, n), [&] {
-                                         return reader.read(field.files[n], field.grid, kVector);
+                                         auto samples = reader.read(field.files[n], field.grid, kVector);
+                                         require_speed(scene, *samples);
+                                         return samples;
                                      })});
     }
     for (std::size_t n = 0; n < scene.automaton.field.grids.size(); ++n) {
@@ -150,8 +171,9 @@ void check_files(const Scene& scene) {
         const WindField& field = scene.automaton.wind.fields[f];
         for (std::size_t n = 0; n < field.files.size(); ++n)
             found.add([&] {
-                read_at_key(scene, wind_file_key(scene, f, n),
-                            [&] { SampleReader().read(field.files[n], field.grid, kVector); });
+                read_at_key(scene, wind_file_key(scene, f, n), [&] {
+                    require_speed(scene, *SampleReader().read(field.files[n], field.grid, kVector));
+                });
             });
     }
     for (std::size_t n = 0; n < scene.automaton.field.grids.size(); ++n)

@@ -80,6 +80,28 @@ std::vector<WindLevel> wind_levels(const Scene& scene, std::optional<std::size_t
     return levels;
 }
 
+Velocity wind_at_height(const Scene& scene, double height_m, double time_s) {
+    return wind_at(wind_of_height(scene, height_m), height_m, time_s);
+}
+
+std::vector<WindLevel> wind_profile(const Scene& scene, double time_s) {
+    if (have_one_wind(scene)) return table_of(common_wind(scene), time_s);
+    std::set<double> heights;
+    const auto add = [&](const Wind& wind) {  // the levels that are of this wind
+        for (const WindLevel& level : table_of(wind, time_s))
+            if (&wind_of_height(scene, level.height_m) == &wind) heights.insert(level.height_m);
+    };
+    add(common_wind(scene));
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        const LayerOptions& layer = scene.layers[n];
+        add(layer_wind(scene, n));
+        for (const int k : {0, layer.extent.z - 1}) heights.insert(height_of_level(layer.placement, k));
+    }
+    std::vector<WindLevel> levels;
+    for (const double height : heights) levels.push_back({height, wind_at_height(scene, height, time_s)});
+    return levels;
+}
+
 // Bowring's formula of one step, exact to 1e-9 degrees near the surface: Survey Review 23 (1976), p. 323.
 double msl_height_m(const Georeference& place) {
     if (!place.given) return 0;

@@ -19,6 +19,13 @@ namespace nephos {
 std::vector<WindLevel> wind_levels(const Scene& scene, std::optional<std::size_t> layer, const Placement& box,
                                    Extent size, double time_s);
 
+// Returns the wind of all heights as such a table, without a box: the levels of each layer's wind within its lattice, with the
+// centres of that one's lowest and highest cells, and those of the common wind outside.
+std::vector<WindLevel> wind_profile(const Scene& scene, double time_s);
+
+// Returns the wind at a height: of the first layer whose lattice holds it, else the common one.
+Velocity wind_at_height(const Scene& scene, double height_m, double time_s);
+
 // Returns the velocity at the centre of each level of voxels, size.z of them.
 std::vector<Velocity> wind_of_levels(const Scene& scene, std::optional<std::size_t> layer,
                                      const Placement& box, Extent size, double time_s);

@@ -192,7 +192,12 @@ class Frames {
         } else if (!too_large_.empty()) {
             checks.push_back({"layers", true, too_large_});
         }
-        if (!last_) return;
+        if (!last_) {
+            const std::string none = "there is no density";
+            if (options.seam) checks.push_back({"seam", false, none, {}, false});
+            if (options.max_change) checks.push_back({"motion", false, none, {}, false});
+            return;
+        }
         checks.push_back(check_seams(run_, *last_, options.seam));
         if (is_too_large(*last_)) {
             const bool is_asked = options.max_change.has_value();

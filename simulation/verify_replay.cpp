@@ -96,7 +96,7 @@ Simulation run_anew(const RunListing& run, const Scene& scene, const SimulationR
 Check replay_frames(const RunListing& run, int count) {
     Replay sink(run);
     try {
-        if (run.frames.empty()) return {"replay", true, "there is no frame to simulate"};
+        if (run.frames.empty()) return {"replay", false, "there is no frame to simulate", {}, false};
         const int first = run.frames.front().number;
         const int last = std::min(run.frames.back().number, first + count - 1);
         Scene scene = run.scene;

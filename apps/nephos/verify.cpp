@@ -34,6 +34,8 @@ Verification verify_folder(const VerifyArguments& a) {
 }
 
 int verify(const VerifyArguments& a) {
+    if (a.options.hashes_only && (a.options.seam || a.options.max_change))
+        throw Error(ErrorCode::usage, "--hashes decodes nothing: leave it out, or --seam and --max-change");
     limit_threads(a.work.threads);
     const Verification result = verify_folder(a);
     Output output;
@@ -100,7 +102,8 @@ void add_verify_command(CLI::App& app, Action& action) {
         "voxels are\n"
         "those of the manifest; transform, bounds and class are the same in all files; values are finite, 0 "
         "to 1;\n"
-        "metadata agree with the manifest; layers add up to the common grid. Reported: roughness at the seam "
+        "metadata agree with the manifest; layers add up to the common grid; the tables of one that is not\n"
+        "complete begin with what was saved. Reported: roughness at the seam "
         "of\n"
         "periodic axes, largest change of a voxel and of sharpness. Of an export: checksums, and the voxels "
         "read\n"

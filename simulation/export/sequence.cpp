@@ -19,14 +19,14 @@
 namespace nephos {
 namespace {
 
-// "cloud" and 12 of "cloud_0012.vdb"; without a number the whole stem.
+// "cloud" and 12 of "cloud_0012.vdb"; without the number of a frame, as in "wind_20261201.vdb", the whole stem.
 std::pair<std::string, std::optional<int>> split_name(const std::filesystem::path& file) {
     const std::string stem = file.stem().string();
     const std::size_t at = stem.find_last_not_of("0123456789");
     const std::string digits = at == stem.npos ? stem : stem.substr(at + 1);
     int number = 0;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-    if (digits.empty() || error != std::errc() || number < 0) return {stem, {}};
+    if (digits.empty() || error != std::errc() || number < 0 || number > kMaxFrames) return {stem, {}};
     std::string name = stem.substr(0, stem.size() - digits.size());
     while (!name.empty() && (name.back() == '_' || name.back() == '.' || name.back() == '-')) name.pop_back();
     return {name.empty() ? "volume" : name, number};
@@ -34,7 +34,11 @@ std::pair<std::string, std::optional<int>> split_name(const std::filesystem::pat
 
 // Names stand in texts of formats that hold UTF-8 alone.
 void require_name(const std::filesystem::path& file, const std::string& name) {
-    if (find_invalid_utf8(name) == name.size() && printable(name) == name && name.find('\t') == name.npos)
+    const bool is_text = find_invalid_utf8(name) == name.size() && printable(name) == name;
+    constexpr std::string_view kNone[] = {"\t", "\xEF\xBF\xBE",
+                                          "\xEF\xBF\xBF"};  // U+FFFE and U+FFFF are no characters
+    if (is_text &&
+        std::ranges::none_of(kNone, [&](std::string_view none) { return name.find(none) != name.npos; }))
         return;
     throw Error(ErrorCode::usage,
                 file.string() +
@@ -113,10 +117,6 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
     std::int64_t next = 1;
     for (const std::filesystem::path& file : files) {
         const std::int64_t number = split_name(file).second.value_or(files.size() == 1 ? 1 : next);
-        if (number > kMaxFrames)
-            throw Error(ErrorCode::usage,
-                        fmt::format("{}: its number {} is above {}, the most that a frame has", file.string(),
-                                    number, kMaxFrames));
         if (number < next && !s.frames.empty())
             throw Error(ErrorCode::usage,
                         file.string() + ": its number does not follow that of the file before");

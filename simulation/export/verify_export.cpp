@@ -209,9 +209,10 @@ bool is_of_file_in(const std::filesystem::path& folder, const Error& error) {
 
 Verification verify_export(const std::filesystem::path& folder, const VerifyOptions& options) {
     const ListedExport list = read_export(folder);
-    if (options.against || options.replay > 0)
-        throw Error(ErrorCode::usage,
-                    folder.string() + ": is an export; --against and --replay are for runs");
+    if (options.against || options.replay > 0 || options.seam || options.max_change)
+        throw Error(
+            ErrorCode::usage,
+            folder.string() + ": is an export; --against, --replay, --seam and --max-change are for runs");
     Verification result{"export", {check_list(folder / "export.json")}};
     if (!list.complete)
         result.checks.push_back({"complete", false, "the export was interrupted: the same command goes on"});

@@ -106,13 +106,9 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
     }
     std::erase_if(w.layers, [](const LayerSummary& s) { return !(s.columns.cover > 0); });
     std::ranges::stable_sort(w.layers, {}, [](const LayerSummary& s) { return s.columns.cloud_base_m; });
-    for (const WindLevel& level :
-         wind_levels(scene, scene.layers.empty() ? std::nullopt : std::optional<std::size_t>(0), {}, {},
-                     frame.time_s))
+    for (const WindLevel& level : wind_profile(scene, frame.time_s))
         w.wind.emplace_back(level.height_m, level.velocity);
-    const Wind& wind = scene.layers.empty() || !scene.automaton.wind.keyframes.empty() ? scene.automaton.wind
-                                                                                       : layer_wind(scene, 0);
-    const Velocity surface = wind_at(wind, kSurface_m, frame.time_s);
+    const Velocity surface = wind_at_height(scene, kSurface_m, frame.time_s);
     w.surface_m_per_s = speed_of(surface);
     w.surface_from_deg = bearing_from(surface, heading);
     const Fog& fog = scene.render.fog;

@@ -55,6 +55,24 @@ class Metar(Case):
     def explained(self, report, *arguments):
         return json.loads(self.call("metar", report, "--explain", "--json", *arguments).stdout)
 
+    def test_winds_of_layers(self):
+        """Each height has the wind of the layer that holds it, in all formats of weather."""
+        layer = """
+[[layer]]
+name = "{}"
+lattice = {{ cells = [12, 12, 6], cell_size_m = 100, origin_m = [0, 0, {}] }}
+wind = [{{ levels = [{{ height_m = 0, from_deg = {}, speed_m_per_s = {} }}] }}]
+veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m = {} }}
+"""
+        scene = self.write("winds.toml", 'name = "winds"\n[time]\nsteps = 2\n[frames]\ncount = 1\n' +
+                           layer.format("Cu", 500, 270, 5, 550, 1000) + layer.format("Ac", 3000, 90, 20, 3050, 3500))
+        self.call("run", scene, "--no-render", "--out", "winds", "-q")
+        self.call("export", "winds", "--to", "xplane", "--to", "wpr", "--to", "layers", "-o", "told")
+        frame = json.loads((self.folder / "told/winds.xplane.json").read_text())["frames"][0]
+        found = [(wind["alt_msl"], wind["direction"], wind["speed"]) for wind in frame["wind_layers"]]
+        self.assertEqual([(round(m), round(deg)) for m, deg, _ in found], [(0, 270), (550, 270), (1050, 270), (3050, 90), (3550, 90)])
+        self.assertAlmostEqual(found[-1][2] / found[0][2], 4, 3)
+
     def test_real_reports_are_read(self):
         for report in REAL:
             with self.subTest(report=report):
