@@ -331,9 +331,7 @@ Resumption find_resumption(const RunSettings& settings, const RunFolder& folder)
     const EarlierRun earlier = read_manifest(folder.manifest());
     const Scene before = scene_before(earlier, settings, folder);
     const bool same = earlier.range == settings.range && earlier.render == settings.render;
-    // A checkpoint that is asked for is made by running once more.
-    if (same && earlier.complete && settings.statistics_only && !settings.checkpoint)
-        return Resumption::complete;
+    if (same && earlier.complete && settings.statistics_only) return Resumption::complete;
     if (!same && earlier.range != range_before(settings, before))
         refuse(folder, "it holds a run of the same scene for " + range_text(earlier));
     return Resumption::start_anew;
