@@ -240,10 +240,13 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
                     changed->string() + ": was changed while the run began: give the same command again");
     recorder.set_inputs(std::move(inputs));
     const std::uint64_t first_step = simulation.steps_taken();
+    const bool was_complete =
+        settings.resume && simulation.finished() && read_manifest(folder.manifest()).complete;
     if (settings.resume) {
         recorder.take_over(simulation);
         // Before later rows are cut off the tables that it lists.
-        if (!simulation.finished()) recorder.write_manifest(false, seconds_since(begin));
+        if (!was_complete) recorder.write_manifest(false, seconds_since(begin));
+        recorder.cut_tables();
     } else if (settings.branch) {
         recorder.begin_branch(simulation);
     } else {
@@ -251,8 +254,6 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         recorder.begin();
     }
     recorder.start_video(simulation, observer.stop);
-    const bool was_complete =
-        settings.resume && simulation.finished() && read_manifest(folder.manifest()).complete;
     if (was_complete && settings.checkpoint && !recorder.makes_video()) {
         recorder.leave_complete();
         RunReport report = report_of(recorder, settings, simulation);

@@ -193,6 +193,11 @@ std::string RunRecorder::relative(const std::filesystem::path& path) const {
     return path.lexically_relative(settings_.folder).generic_string();
 }
 
+void RunRecorder::cut_tables() {
+    statistics_->cut();
+    for (StatisticsFile& file : layer_statistics_) file.cut();
+}
+
 void RunRecorder::note_tables() {
     state_.tables = {{relative(folder_.statistics()), statistics_->content(), {}}};
     for (std::size_t n = 0; n < layer_statistics_.size(); ++n)

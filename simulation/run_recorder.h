@@ -38,6 +38,9 @@ class RunRecorder : public SimulationSink {
     // to must outlive this object.
     void set_guard(std::function<void()> guard);
 
+    // Cuts off rows of the tables that are behind those that were taken over.
+    void cut_tables();
+
     // Frames whose files are all there.
     int frames_done() const { return frames_done_; }
 

@@ -80,14 +80,17 @@ void add(Digest& digest, const SampleGrid& grid) {
 void require_speed(const Scene& scene, const SampleGrid& samples) {
     double cell_m = std::numeric_limits<double>::infinity();
     for (std::size_t n = 0; n < lattice_count(scene); ++n)
-        cell_m = std::min(cell_m, automaton_options(scene, n).placement.cell_size_m);
-    const double most_m_per_s = kMaxExtent * cell_m / scene.automaton.time_step_s;
+        if (scene.layers.empty() || (scene.layers[n].automaton && !scene.layers[n].is_veil))
+            cell_m = std::min(cell_m, automaton_options(scene, n).placement.cell_size_m);
+    const double most_m_per_s = double(kMaxCellsOfStep) * cell_m / scene.automaton.time_step_s;
     for (const float value : samples.values)
         if (!(std::abs(double(value)) <= most_m_per_s))
-            throw Error(ErrorCode::usage,
-                        fmt::format("a wind of {} m/s moves the air by more than {} cells in one step: "
-                                    "expected at most {} m/s",
-                                    number_text(value, 6), kMaxExtent, number_text(most_m_per_s, 6)));
+            throw Error(
+                ErrorCode::usage,
+                fmt::format(
+                    "a wind of {} m/s moves the air too far in one step; at most 2^24 cells are possible, "
+                    "which are {} m/s",
+                    number_text(value, 6), number_text(most_m_per_s, 6)));
 }
 
 }  // namespace

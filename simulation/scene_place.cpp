@@ -96,6 +96,10 @@ std::vector<WindLevel> wind_profile(const Scene& scene, double time_s) {
         const LayerOptions& layer = scene.layers[n];
         add(layer_wind(scene, n));
         for (const int k : {0, layer.extent.z - 1}) heights.insert(height_of_level(layer.placement, k));
+        for (const int k : {-1, layer.extent.z}) {  // where another wind begins
+            const double height = height_of_level(layer.placement, k);
+            if (&wind_of_height(scene, height) != &layer_wind(scene, n)) heights.insert(height);
+        }
     }
     std::vector<WindLevel> levels;
     for (const double height : heights) levels.push_back({height, wind_at_height(scene, height, time_s)});

@@ -20,7 +20,7 @@ std::vector<WindLevel> wind_levels(const Scene& scene, std::optional<std::size_t
                                    Extent size, double time_s);
 
 // Returns the wind of all heights as such a table, without a box: the levels of each layer's wind within its lattice, with the
-// centres of that one's lowest and highest cells, and those of the common wind outside.
+// centres of that one's lowest and highest cells and of those beyond, and those of the common wind outside.
 std::vector<WindLevel> wind_profile(const Scene& scene, double time_s);
 
 // Returns the wind at a height: of the first layer whose lattice holds it, else the common one.

@@ -74,13 +74,14 @@ class StatisticsFile {
     // Flushes: when it returns, all rows are in the file and on the device. Throws Error(io), also when the file was
     // removed or replaced; the file then ends with a whole row.
     void save();
+    // Cuts off what stands behind the rows. Throws Error(io).
+    void cut();
     // Size and checksum of what is in the file: of all rows after save().
     FileDigest content() const { return {size_, digest_.hex()}; }
 
   private:
     StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size, Digest digest);
     void write_out();
-    void cut();
 
     std::filesystem::path path_;
     Descriptor file_;

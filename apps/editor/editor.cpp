@@ -307,7 +307,10 @@ Editor::Editor(const EditorOptions& from)
     of_window.height = options.height > 0 ? options.height : settings.height;
     of_window.device = options.device;
     of_window.validation = options.validation;
-    of_window.lost = [this] { fmt::print(stderr, "error: the display is gone{}\n", kept_edits(*this)); };
+    of_window.lost = [this] {
+        const std::string said = "error: the display is gone" + kept_edits(*this) + "\n";
+        std::fputs(said.c_str(), stderr);
+    };
     // Simulates the first picture while the window opens.
     follow_document(*this);
     live->run(running);

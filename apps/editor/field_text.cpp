@@ -136,7 +136,11 @@ void forget_other_text(ImGuiID id, const std::string& field) {
     last.id = 0;
     ImGuiInputTextState* const state = ImGui::GetInputTextState(id);
     if (state == nullptr) return;
-    if (ImGui::GetActiveID() == id) ImGui::ClearActiveID();
+    if (ImGui::GetActiveID() == id) {
+        ImGui::ClearActiveID();
+        ImGui::GetCurrentContext()->ActiveIdPreviousFrameHasBeenEditedBefore =
+            false;  // what was typed is not taken
+    }
     state->ID = 0;
 }
 

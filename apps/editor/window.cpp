@@ -58,7 +58,10 @@ Function* symbol(const char* name) {
 std::function<void()> when_lost;
 
 int on_lost_display(void*) {
-    if (when_lost) when_lost();
+    try {
+        if (const std::function<void()> then = std::exchange(when_lost, {})) then();
+    } catch (const std::exception&) {  // Xlib called, and the program ends
+    }
     std::_Exit(int(ErrorCode::gpu));
 }
 

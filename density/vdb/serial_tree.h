@@ -5,6 +5,7 @@
 // waits for a lock that one of them held at that moment waits for ever. Private to density/vdb.
 
 #include <cstdint>
+#include <exception>
 #include <memory>
 
 #include <openvdb/openvdb.h>
@@ -22,8 +23,11 @@ std::shared_ptr<Grid> freed_serially(std::shared_ptr<Grid> grid) {
     return std::shared_ptr<Grid>(pointer, [owner = std::move(grid)](Grid*) mutable {
         openvdb::GridBase& any = *owner;
         constexpr long kAlone = 2;  // the grid, and the pointer that is asked
-        if (any.baseTreePtr().use_count() == kAlone)
-            any.apply<openvdb::GridTypes>([](auto& typed) { typed.tree().root().clear(); });
+        try {
+            if (any.baseTreePtr().use_count() == kAlone)
+                any.apply<openvdb::GridTypes>([](auto& typed) { typed.tree().root().clear(); });
+        } catch (const std::exception&) {  // no memory for the name of its type
+        }
         owner.reset();
     });
 }

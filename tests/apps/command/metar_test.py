@@ -70,8 +70,8 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
         self.call("export", "winds", "--to", "xplane", "--to", "wpr", "--to", "layers", "-o", "told")
         frame = json.loads((self.folder / "told/winds.xplane.json").read_text())["frames"][0]
         found = [(wind["alt_msl"], wind["direction"], wind["speed"]) for wind in frame["wind_layers"]]
-        self.assertEqual([(round(m), round(deg)) for m, deg, _ in found], [(0, 270), (550, 270), (1050, 270), (3050, 90), (3550, 90)])
-        self.assertAlmostEqual(found[-1][2] / found[0][2], 4, 3)
+        self.assertEqual([(round(m), round(deg)) for m, deg, _ in found], [(0, 270), (550, 270), (1050, 270), (2950, 270), (3050, 90), (3550, 90), (3650, 270)])
+        self.assertAlmostEqual(found[4][2] / found[0][2], 4, 3)
 
     def test_real_reports_are_read(self):
         for report in REAL:
