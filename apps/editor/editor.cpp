@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/editor/field_text.h"
 #include "apps/editor/report.h"
 #include "apps/editor/script.h"
 #include "apps/editor/state.h"
@@ -227,12 +228,15 @@ int loop(Editor& editor, Report& report) {
             std::this_thread::sleep_for(std::chrono::duration<double>(pause / 2));
         if (std::exchange(editor.theme_changed, false)) apply_theme(editor);
         if (!editor.window->begin_frame(script.is_active() ? 0 : std::max(pause, 0.001))) {
-            editor.window->ask_to_close(false);
-            ask_before(editor, Pending::close);
+            if (!press_enter_in_field()) {  // what is typed is taken first
+                editor.window->ask_to_close(false);
+                ask_before(editor, Pending::close);
+            }
         }
         const double interval = seconds_since(last_frame);
         last_frame = Clock::now();
         if (scripted && script.is_active()) script.apply(editor);
+        finish_field_first();
         ImGui::NewFrame();
         const ImGuiIO& io = ImGui::GetIO();
         if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0 || io.MouseWheel != 0 || ImGui::IsAnyItemActive()) {

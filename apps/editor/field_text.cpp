@@ -2,8 +2,10 @@
 #include "apps/editor/field_text.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <map>
+#include <set>
 #include <vector>
 
 #include <imgui_internal.h>
@@ -160,6 +162,25 @@ bool edited(const char* label, std::string& text, const Show& show) {
     return result;
 }
 
+// Input that waits for a field to be finished.
+struct HeldInput {
+    bool presses_enter = false, is_new = false;  // new: before the frame in which it is pressed
+    std::array<bool, 3> buttons{};
+    int key = -1, released_key = -1;  // with Ctrl
+    bool shift = false;
+};
+
+// Fields in which Enter does something else: a line more, or what a dialog is there for.
+std::set<ImGuiID>& fields_with_own_enter() {
+    static std::set<ImGuiID> ids;
+    return ids;
+}
+
+HeldInput& held_input() {
+    static HeldInput held;
+    return held;
+}
+
 // What the backend has set.
 struct Clipboard {
     const char* (*get)(void*) = nullptr;
@@ -194,7 +215,66 @@ std::string text_of_field(std::string_view field) {
     });
 }
 
+bool press_enter_in_field() {
+    const ImGuiContext& g = *ImGui::GetCurrentContext();
+    const ImGuiInputTextState& state = g.InputTextState;
+    if (g.ActiveId == 0 || g.ActiveId != state.ID || fields_with_own_enter().contains(g.ActiveId))
+        return false;
+    ImGuiIO& io = ImGui::GetIO();
+    const int enter = io.KeyMap[ImGuiKey_Enter];
+    if (enter < 0 || io.KeysDown[enter]) return false;
+    io.KeysDown[enter] = true;
+    held_input().presses_enter = held_input().is_new = true;
+    return true;
+}
+
+void finish_field_first() {
+    ImGuiContext& g = *ImGui::GetCurrentContext();
+    ImGuiIO& io = ImGui::GetIO();
+    HeldInput& held = held_input();
+    if (held.is_new) {
+        held.is_new = false;
+    } else if (held.presses_enter) {
+        io.KeysDown[io.KeyMap[ImGuiKey_Enter]] = false;
+        for (std::size_t button = 0; button < held.buttons.size(); ++button)
+            if (held.buttons[button]) io.MouseDown[button] = true;
+        if (held.key >= 0) {
+            io.KeysDown[held.key] = true;
+            io.KeyCtrl = true;
+            io.KeyShift = held.shift;
+        }
+        const int forced = held.key;
+        held = {};
+        held.released_key = forced;
+    } else if (held.released_key >= 0) {
+        io.KeysDown[held.released_key] = false;
+        held = {};
+    } else {
+        HeldInput found;
+        for (std::size_t button = 0; button < found.buttons.size(); ++button)
+            found.buttons[button] = io.MouseDown[button] && io.MouseDownDuration[button] < 0 &&
+                                    g.HoveredIdPreviousFrame != g.ActiveId;
+        for (const int key : {'S', 'O', 'N', 'Q', 'R'})
+            if (io.KeyCtrl && io.KeysDown[key] && io.KeysDownDuration[key] < 0) found.key = key;
+        const bool is_click = std::ranges::count(found.buttons, true) > 0;
+        if ((is_click || found.key >= 0) && press_enter_in_field()) {
+            for (std::size_t button = 0; button < found.buttons.size(); ++button)
+                if (found.buttons[button]) io.MouseDown[button] = false;
+            if (found.key >= 0) {
+                found.shift = io.KeyShift;
+                io.KeysDown[found.key] = false;
+                io.KeyCtrl = io.KeyShift = false;
+            }
+            found.presses_enter = true;
+            held = found;
+        }
+    }
+    if (g.InputTextState.ID != 0 && g.ActiveId != g.InputTextState.ID) g.InputTextState.ID = 0;
+}
+
 bool input_text(const char* label, std::string& text, const char* hint, ImGuiInputTextFlags flags) {
+    if ((flags & ImGuiInputTextFlags_EnterReturnsTrue) != 0)
+        fields_with_own_enter().insert(ImGui::GetCurrentWindow()->GetID(label));
     return edited(label, text, [&](std::string& field, ImGuiInputTextFlags more) {
         return hint == nullptr ? ImGui::InputText(label, &field, flags | more)
                                : ImGui::InputTextWithHint(label, hint, &field, flags | more);
@@ -204,6 +284,7 @@ bool input_text(const char* label, std::string& text, const char* hint, ImGuiInp
 bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGuiInputTextFlags flags) {
     std::string lines = without_returns(text);
     const std::string before = lines;
+    fields_with_own_enter().insert(ImGui::GetCurrentWindow()->GetID(label));
     edited(label, lines, [&](std::string& field, ImGuiInputTextFlags more) {
         return ImGui::InputTextMultiline(label, &field, size, flags | more);
     });

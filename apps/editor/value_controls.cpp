@@ -269,9 +269,14 @@ std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
     const std::vector<std::string> names = candidates(editor, row);
     ImGui::SetNextItemWidth(names.empty() ? width_before_file_button(row) : -1);
     if (names.empty()) {
+        const std::string before = shown;
+        const bool is_plain = std::ranges::none_of(texts, [](const std::string& text) {
+            return text.empty() || text.find(',') != text.npos || text.front() == ' ' || text.back() == ' ';
+        });
         ImGui::BeginGroup();
-        input_text("##value", shown);
-        const bool typed = ImGui::IsItemDeactivatedAfterEdit();
+        input_text("##value", shown, nullptr, is_plain ? 0 : ImGuiInputTextFlags_ReadOnly);
+        if (!is_plain) tooltip_of_last("A text with a comma or blanks around it is edited in Text");
+        const bool typed = ImGui::IsItemDeactivatedAfterEdit() && shown != before;
         file_choice(editor, row, [texts, as_toml](const std::string& name) {
             std::vector<std::string> more = texts;
             if (std::ranges::find(more, name) == more.end()) more.push_back(name);

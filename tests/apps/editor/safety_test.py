@@ -183,6 +183,44 @@ class Safety(Case):
         self.assertEqual(editor.returncode, 0, said)
         self.assertEqual(scene.read_text(encoding="utf-8"), other)
 
+    def test_what_is_typed_counts_wherever_it_is_left(self):
+        """Also by a click on what is drawn before the field, by Ctrl+S, and in a field of numbers; and Ctrl+Z in a field that was left
+        is of the text that it has now."""
+        scene = self.folder / "a.toml"
+        text = 'name = "models"\nseed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n'
+        typed = "wait-step 1\nclick scene\nwait 0.2\nclick name\nkey END\ntype xyz\nwait 0.2\n"
+        for leave in ("click lattice", "click seed", "click \"menu Edit\"\nkey ESCAPE", "click \"tab View\"", "key ENTER", ""):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script=f"{typed}{leave}\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+            self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("models", "modelsxyz"), leave)
+        # Nothing is left of a way back to another text: refused, taken back by Escape, or changed by the document's undo.
+        for edit in ("click name\nkey END\ntype abcdefghijklmnopqrs\nwait 0.1\nclick lattice\nwait 0.3\nclick \"tab View\"\nkey CTRL+Z\nwait 0.3\n"
+                     "click scene\nwait 0.2\nclick name",
+                     "click seed\nkey END\ntype 123456789012345678901\nkey ENTER\nwait 0.2\nclick seed",
+                     "click name\nkey END\ntype xyz\nkey ESCAPE\nwait 0.1\nclick name"):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script=f"wait-step 1\nclick scene\nclick \"tab Properties\"\nwait 0.2\n{edit}\nwait 0.1\n"
+                                    "key CTRL+Z\nwait 0.1\nkey CTRL+Y\nkey CTRL+Z\nkey CTRL+Z\nwait 0.2\nkey ENTER\nkey CTRL+S\nwait 0.5\n")
+            self.assertEqual(scene.read_text(encoding="utf-8"), text, edit)
+
+    def test_a_text_with_a_comma_is_not_divided(self):
+        scene = self.folder / "a.toml"
+        text = 'models = "a,b.toml"\nname = "s"\n'
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script="""
+            wait 1
+            click scene
+            wait 0.2
+            click models
+            key END
+            type x
+            key ENTER
+            wait 0.3
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertEqual(scene.read_text(encoding="utf-8"), text)
+
     def test_a_run_of_a_text_with_problems(self):
         """It is not that of the scene before, which the window still shows."""
         scene = self.models()
