@@ -198,7 +198,7 @@ struct FoundVariable {
     std::string name;
     std::vector<std::uint64_t> dimensions;
     std::uint32_t type = 0;
-    std::uint64_t begin = 0, bytes = 0;
+    std::uint64_t begin = 0;
     std::uint64_t attributes_at = 0;  // byte of the file
     Attributes attributes;            // of the one that is read
 };
@@ -473,7 +473,7 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
         variable.attributes_at = reader.at();
         skip_attributes(reader, path);
         variable.type = reader.next<std::uint32_t>();
-        variable.bytes = reader.count();
+        reader.count();  // of bytes: redundant
         variable.begin = reader.offset();
         if (!variable.dimensions.empty() && dimensions[variable.dimensions[0]].size == 0) {
             // By dimensions and type: what is stated is redundant, and wrong in some files (classic format, note on vsize).
