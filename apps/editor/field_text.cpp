@@ -166,8 +166,10 @@ bool edited(const char* label, std::string& text, const Show& show) {
 struct HeldInput {
     bool presses_enter = false, is_new = false;  // new: before the frame in which it is pressed
     std::array<bool, 3> buttons{};
-    int key = -1, released_key = -1;  // with Ctrl
-    bool shift = false;
+    int key = -1, released_key = -1;
+    bool ctrl = false, shift = false;
+    bool again =
+        false;  // the key is pressed twice: the first Tab gives a field that was finished the caret back
 };
 
 // Fields in which Enter does something else: a line more, or what a dialog is there for.
@@ -240,27 +242,37 @@ void finish_field_first() {
             if (held.buttons[button]) io.MouseDown[button] = true;
         if (held.key >= 0) {
             io.KeysDown[held.key] = true;
-            io.KeyCtrl = true;
+            io.KeyCtrl = held.ctrl;
             io.KeyShift = held.shift;
         }
-        const int forced = held.key;
-        held = {};
-        held.released_key = forced;
+        HeldInput then;
+        then.released_key = held.key;
+        then.again = held.again;
+        held = then;
     } else if (held.released_key >= 0) {
         io.KeysDown[held.released_key] = false;
-        held = {};
+        HeldInput then;
+        then.presses_enter = held.again;
+        then.key = held.again ? held.released_key : -1;
+        held = then;
     } else {
         HeldInput found;
         for (std::size_t button = 0; button < found.buttons.size(); ++button)
             found.buttons[button] = io.MouseDown[button] && io.MouseDownDuration[button] < 0 &&
                                     g.HoveredIdPreviousFrame != g.ActiveId;
+        const auto is_new = [&](int key) { return io.KeysDown[key] && io.KeysDownDuration[key] < 0; };
         for (const int key : {'S', 'O', 'N', 'Q', 'R'})
-            if (io.KeyCtrl && io.KeysDown[key] && io.KeysDownDuration[key] < 0) found.key = key;
+            if (io.KeyCtrl && is_new(key)) found.key = key;
+        if (const int tab = io.KeyMap[ImGuiKey_Tab]; tab >= 0 && !io.KeyCtrl && is_new(tab)) {
+            found.key = tab;
+            found.again = !io.KeyShift;
+        }
         const bool is_click = std::ranges::count(found.buttons, true) > 0;
         if ((is_click || found.key >= 0) && press_enter_in_field()) {
             for (std::size_t button = 0; button < found.buttons.size(); ++button)
                 if (found.buttons[button]) io.MouseDown[button] = false;
             if (found.key >= 0) {
+                found.ctrl = io.KeyCtrl;
                 found.shift = io.KeyShift;
                 io.KeysDown[found.key] = false;
                 io.KeyCtrl = io.KeyShift = false;

@@ -33,7 +33,7 @@ bool input_text(const char* label, std::string& text, const char* hint = nullptr
 bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGuiInputTextFlags flags = 0);
 
 // To be called right before ImGui::NewFrame(), when all input is known. A field of one line gives its text away where it is left,
-// but one that is drawn before it, or a shortcut, acts first: so a click elsewhere and Ctrl with a letter wait for a frame in
+// but one that is drawn before it, or a shortcut, acts first: so a click elsewhere, Tab and Ctrl with a letter wait for a frame in
 // which Enter is pressed. And a field that was left forgets its way back, which is of a text that may not have been taken.
 void finish_field_first();
 

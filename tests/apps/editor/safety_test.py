@@ -189,10 +189,13 @@ class Safety(Case):
         scene = self.folder / "a.toml"
         text = 'name = "models"\nseed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n'
         typed = "wait-step 1\nclick scene\nwait 0.2\nclick name\nkey END\ntype xyz\nwait 0.2\n"
-        for leave in ("click lattice", "click seed", "click \"menu Edit\"\nkey ESCAPE", "click \"tab View\"", "key ENTER", ""):
+        for leave in ("click lattice", "click seed", "click \"menu Edit\"\nkey ESCAPE", "click \"tab View\"", "key ENTER", "key TAB", "key SHIFT+TAB", ""):
             scene.write_text(text, encoding="utf-8")
             self.edit(scene, script=f"{typed}{leave}\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
             self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("models", "modelsxyz"), leave)
+        scene.write_text(text, encoding="utf-8")  # Tab goes on to the next field
+        self.edit(scene, script=f"{typed}key TAB\nwait 0.3\ntype 77\nkey ENTER\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+        self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("models", "modelsxyz").replace("= 4", "= 77"))
         # Nothing is left of a way back to another text: refused, taken back by Escape, or changed by the document's undo.
         for edit in ("click name\nkey END\ntype abcdefghijklmnopqrs\nwait 0.1\nclick lattice\nwait 0.3\nclick \"tab View\"\nkey CTRL+Z\nwait 0.3\n"
                      "click scene\nwait 0.2\nclick name",
