@@ -47,7 +47,7 @@ struct AxisPlaces {
     bool operator==(const AxisPlaces&) const { return true; }
 };
 
-// Where the other keys of a plan stand, of which its checks say what is wrong.
+// Says where the other keys of a plan stand, for the checks that tell what is wrong with them.
 struct PlanPlaces {
     std::vector<PlanPlace> overrides;  // the first ones of the plan, those of the file
     PlanPlace scene, design, points, until, layer, tracks;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How well a target is met by what an emulator foretells. Private to study/.
+// Tells how well a target is met by what an emulator foretells. Private to study/.
 
 #include "study/emulator.h"
 #include "study/transform.h"

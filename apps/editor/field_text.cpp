@@ -22,7 +22,7 @@ bool needs_another(unsigned code) {
     return code > kLastOfField || (code >= kFirstPrivate && code <= kLastPrivate);
 }
 
-// Of ImGui's fields as a whole, like its context.
+// Holds the table of all fields: ImGui has one context, too.
 struct Table {
     std::map<unsigned, unsigned> fields;  // private characters by what they stand for
     std::vector<unsigned> codes;          // the n-th of them stands for
@@ -162,14 +162,17 @@ bool edited(const char* label, std::string& text, const Show& show) {
     return result;
 }
 
-// Input that waits for a field to be finished.
+// Input that waits for a field to be finished, frame by frame:
+//
+//     Enter is pressed  -->  released, what waits is pressed  -->  released  (-->  Tab once more)
+enum class Waiting { none, enter_is_pressed, to_be_passed_on, passed_on };
+
 struct HeldInput {
-    bool presses_enter = false, is_new = false;  // new: before the frame in which it is pressed
+    Waiting stage = Waiting::none;
     std::array<bool, 3> buttons{};
-    int key = -1, released_key = -1;
+    int key = -1;
     bool ctrl = false, shift = false;
-    bool again =
-        false;  // the key is pressed twice: the first Tab gives a field that was finished the caret back
+    bool again = false;  // Tab: the first one gives a field that was finished the caret back
 };
 
 // Fields in which Enter does something else: a line more, or what a dialog is there for.
@@ -183,7 +186,7 @@ HeldInput& held_input() {
     return held;
 }
 
-// What the backend has set.
+// Keeps what the backend has set.
 struct Clipboard {
     const char* (*get)(void*) = nullptr;
     void (*set)(void*, const char*) = nullptr;
@@ -226,61 +229,75 @@ bool press_enter_in_field() {
     const int enter = io.KeyMap[ImGuiKey_Enter];
     if (enter < 0 || io.KeysDown[enter]) return false;
     io.KeysDown[enter] = true;
-    held_input().presses_enter = held_input().is_new = true;
+    held_input().stage = Waiting::enter_is_pressed;
     return true;
 }
 
+namespace {
+
+// Presses what has waited.
+void pass_on(HeldInput& held, ImGuiIO& io) {
+    io.KeysDown[io.KeyMap[ImGuiKey_Enter]] = false;
+    for (std::size_t button = 0; button < held.buttons.size(); ++button)
+        if (held.buttons[button]) io.MouseDown[button] = true;
+    held.buttons = {};
+    if (held.key < 0) return;
+    io.KeysDown[held.key] = true;
+    io.KeyCtrl = held.ctrl;
+    io.KeyShift = held.shift;
+}
+
+// Finds a click elsewhere or a key that leaves a field, and lets it wait where there is one to be finished.
+void hold_back(HeldInput& held, ImGuiIO& io) {
+    const ImGuiContext& g = *ImGui::GetCurrentContext();
+    HeldInput found;
+    for (std::size_t button = 0; button < found.buttons.size(); ++button)
+        found.buttons[button] = io.MouseDown[button] && io.MouseDownDuration[button] < 0 &&
+                                g.HoveredIdPreviousFrame != g.ActiveId;
+    const auto is_new = [&](int key) { return io.KeysDown[key] && io.KeysDownDuration[key] < 0; };
+    for (const int key : {'S', 'O', 'N', 'Q', 'R'})
+        if (io.KeyCtrl && is_new(key)) found.key = key;
+    if (const int tab = io.KeyMap[ImGuiKey_Tab]; tab >= 0 && !io.KeyCtrl && is_new(tab)) {
+        found.key = tab;
+        found.again = !io.KeyShift;
+    }
+    const bool is_click = std::ranges::count(found.buttons, true) > 0;
+    if ((!is_click && found.key < 0) || !press_enter_in_field()) return;
+    for (std::size_t button = 0; button < found.buttons.size(); ++button)
+        if (found.buttons[button]) io.MouseDown[button] = false;
+    if (found.key >= 0) {
+        found.ctrl = io.KeyCtrl;
+        found.shift = io.KeyShift;
+        io.KeysDown[found.key] = false;
+        io.KeyCtrl = io.KeyShift = false;
+    }
+    found.stage = Waiting::to_be_passed_on;
+    held = found;
+}
+
+}  // namespace
+
 void finish_field_first() {
-    ImGuiContext& g = *ImGui::GetCurrentContext();
     ImGuiIO& io = ImGui::GetIO();
     HeldInput& held = held_input();
-    if (held.is_new) {
-        held.is_new = false;
-    } else if (held.presses_enter) {
-        io.KeysDown[io.KeyMap[ImGuiKey_Enter]] = false;
-        for (std::size_t button = 0; button < held.buttons.size(); ++button)
-            if (held.buttons[button]) io.MouseDown[button] = true;
-        if (held.key >= 0) {
-            io.KeysDown[held.key] = true;
-            io.KeyCtrl = held.ctrl;
-            io.KeyShift = held.shift;
-        }
-        HeldInput then;
-        then.released_key = held.key;
-        then.again = held.again;
-        held = then;
-    } else if (held.released_key >= 0) {
-        io.KeysDown[held.released_key] = false;
-        HeldInput then;
-        then.presses_enter = held.again;
-        then.key = held.again ? held.released_key : -1;
-        held = then;
-    } else {
-        HeldInput found;
-        for (std::size_t button = 0; button < found.buttons.size(); ++button)
-            found.buttons[button] = io.MouseDown[button] && io.MouseDownDuration[button] < 0 &&
-                                    g.HoveredIdPreviousFrame != g.ActiveId;
-        const auto is_new = [&](int key) { return io.KeysDown[key] && io.KeysDownDuration[key] < 0; };
-        for (const int key : {'S', 'O', 'N', 'Q', 'R'})
-            if (io.KeyCtrl && is_new(key)) found.key = key;
-        if (const int tab = io.KeyMap[ImGuiKey_Tab]; tab >= 0 && !io.KeyCtrl && is_new(tab)) {
-            found.key = tab;
-            found.again = !io.KeyShift;
-        }
-        const bool is_click = std::ranges::count(found.buttons, true) > 0;
-        if ((is_click || found.key >= 0) && press_enter_in_field()) {
-            for (std::size_t button = 0; button < found.buttons.size(); ++button)
-                if (found.buttons[button]) io.MouseDown[button] = false;
-            if (found.key >= 0) {
-                found.ctrl = io.KeyCtrl;
-                found.shift = io.KeyShift;
-                io.KeysDown[found.key] = false;
-                io.KeyCtrl = io.KeyShift = false;
-            }
-            found.presses_enter = true;
-            held = found;
-        }
+    switch (held.stage) {
+        case Waiting::none:
+            hold_back(held, io);
+            break;
+        case Waiting::enter_is_pressed:  // by press_enter_in_field(), for the frame that begins
+            held.stage = Waiting::to_be_passed_on;
+            break;
+        case Waiting::to_be_passed_on:
+            pass_on(held, io);
+            held.stage = Waiting::passed_on;
+            break;
+        case Waiting::passed_on:
+            if (held.key >= 0) io.KeysDown[held.key] = false;
+            held.stage = held.again ? Waiting::to_be_passed_on : Waiting::none;
+            if (!held.again) held = {};
+            held.again = false;
     }
+    ImGuiContext& g = *ImGui::GetCurrentContext();
     if (g.InputTextState.ID != 0 && g.ActiveId != g.InputTextState.ID) g.InputTextState.ID = 0;
 }
 

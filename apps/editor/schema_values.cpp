@@ -64,7 +64,7 @@ std::string readable_name(std::string_view name) {
     return out;
 }
 
-// Of key frames, climates and levels.
+// Returns true for a key that rises from one key frame, climate or level to the next.
 bool rises_from_item_to_item(const Key& tables, const Key& key) {
     return key.name == "time_s" || key.name == "state" || (tables.name == "levels" && key.name == "height_m");
 }

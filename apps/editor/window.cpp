@@ -54,7 +54,7 @@ Function* symbol(const char* name) {
     return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
 }
 
-// What is done when the X server goes away, which Xlib ends the program for.
+// Keeps what edits there are when the X server goes away, which Xlib ends the program for.
 std::function<void()> when_lost;
 
 int on_lost_display(void*) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What OpenVDB does with trees in parallel, done by one thread: in a forked process the threads of oneTBB are not there, and what
+// Does with one thread what OpenVDB does with trees in parallel: in a forked process the threads of oneTBB are not there, and what
 // waits for a lock that one of them held at that moment waits for ever. Private to density/vdb.
 
 #include <cstdint>

@@ -84,45 +84,37 @@ class Safety(Case):
         self.assertEqual(saved["sun"]["elevation_deg"], 21)
         self.assertEqual(saved["model"], tomllib.loads(MODELS)["model"])
 
+    def type_in_first_line(self, scene, text):
+        """Puts the caret at its end in the Text tab, types, and saves."""
+        typed = f"type {text}" if text else ""
+        self.edit(scene, script=f"""
+            wait 1
+            click tab Text
+            wait 0.3
+            click-at text 0.6 0.02
+            wait 0.5
+            key END
+            {typed}
+            wait 0.5
+            click tab View
+            wait 0.5
+            key CTRL+S
+            wait 0.5
+            """)
+
     def test_any_character_and_any_end_of_a_line(self):
         """Characters beyond U+FFFF and private ones, in the text and in a value, stay what they are; a click changes nothing;
         and what is typed at the end of a line stands before its end."""
         scene = self.folder / "any.toml"
         text = "seed = 1 # \U0001f329\U0001f329\ue000\r\nname = \"m\U0001f329\"\r\n[lattice]\r\ncells = [12, 10, 8]\r\n"
-        for more in ("", "type q"):
+        for more in ("", "q"):
             scene.write_text(text, encoding="utf-8", newline="")
-            self.edit(scene, script=f"""
-                wait 1
-                click tab Text
-                wait 0.3
-                click-at text 0.6 0.02
-                wait 0.5
-                key END
-                {more}
-                wait 0.5
-                click tab View
-                wait 0.5
-                key CTRL+S
-                wait 0.5
-                """)
-            self.assertEqual(scene.read_bytes().decode(), text.replace("\ue000\r", "\ue000q\r") if more else text)
+            self.type_in_first_line(scene, more)
+            self.assertEqual(scene.read_bytes().decode(), text.replace("\ue000\r", f"\ue000{more}\r"))
         # Other lines keep their ends, and what is no UTF-8 cannot be typed into.
         for content, typed in ((b"seed = 1\n# a\r\n# b\n", b"seed = 1q\n# a\r\n# b\n"), (b"seed = 1 # caf\xe9\n[lattice]\n", None)):
             scene.write_bytes(content)
-            self.edit(scene, script="""
-                wait 1
-                click tab Text
-                wait 0.3
-                click-at text 0.6 0.02
-                wait 0.5
-                key END
-                type q
-                wait 0.5
-                click tab View
-                wait 0.5
-                key CTRL+S
-                wait 0.5
-                """)
+            self.type_in_first_line(scene, "q")
             self.assertEqual(scene.read_bytes(), typed or content)
         scene.write_text(text, encoding="utf-8", newline="")
         self.edit(scene, script="""
