@@ -240,7 +240,10 @@ class Fitter {
 
     double log_likelihood(const std::vector<double>& point) const {
         double sum = 0;
-        for (std::size_t n = 0; n < transforms_.size(); ++n) sum += match_of(n, point).log_likelihood;
+        for (std::size_t n = 0; n < transforms_.size(); ++n) {
+            const FitTarget& wanted = problem_.targets[n];
+            sum += nephos::log_likelihood(transforms_[n], emulators_[n].at(point), {wanted.value, wanted.sd});
+        }
         return sum;
     }
 
@@ -445,7 +448,8 @@ class Fitter {
         Eigen::MatrixXd jacobian =
             Eigen::MatrixXd::Zero(Eigen::Index(transforms_.size()), Eigen::Index(dimensions_));
         for (std::size_t n = 0; n < transforms_.size(); ++n) {
-            const double scale = match_of(n, centre).sd;
+            const TargetMatch found = match_of(n, centre);
+            const double scale = found.sd / found.unit;
             for (std::size_t d = 0; d < dimensions_; ++d) {
                 std::vector<double> low = centre, high = centre;
                 low[d] -= 1e-4;

@@ -14,9 +14,10 @@ struct TargetValue {
 };
 
 struct TargetMatch {
-    double distance;        // in standard deviations of both
-    double log_likelihood;  // but for what is the same at every point
-    double sd;              // of both, on the emulator's scale
+    double place;     // of the nearest number between both, on the emulator's scale
+    double distance;  // of both from there, in their standard deviations
+    double sd;        // of both, in the statistic's unit
+    double unit;      // the statistic's unit in one of the emulator's scale
 };
 
 // The emulator errs on its own scale (of a cover the logit), the target in the statistic's unit: of all numbers z the one is
@@ -24,8 +25,11 @@ struct TargetMatch {
 //
 //     ((z - foretold) / its error)^2 + ((backward(z) - target) / its sd)^2
 //
-// is least, the square of the distance; the likelihood is the integral over z of the two normal densities about there. Where
-// the scale is linear both are the usual ones, with the sum of the variances. Pure.
+// is least, the square of the distance. Where the scale is linear it is the usual one, with the sum of the variances. Pure.
 TargetMatch match(Transform transform, const Emulator::Prediction& foretold, const TargetValue& target);
+
+// Returns the logarithm of the integral over z of the two normal densities, but for what is the same at every point; exact
+// about the nearest number. Pure.
+double log_likelihood(Transform transform, const Emulator::Prediction& foretold, const TargetValue& target);
 
 }  // namespace nephos
