@@ -12,6 +12,7 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #include "core/descriptor.h"
@@ -30,6 +31,20 @@ namespace {
 bool is_trusted_link(const std::filesystem::path& link) {
     struct stat status {};
     return ::lstat(link.c_str(), &status) == 0 && (status.st_uid == ::geteuid() || status.st_uid == 0);
+}
+
+// Gives a new file the access control list of the one that it replaces, or takes away that of its folder's default. Returns false where
+// that was not possible.
+bool take_access_list(int folder, const std::string& name, int to) {
+    constexpr const char* kAttribute = "system.posix_acl_access";
+    const std::string from = "/proc/self/fd/" + std::to_string(folder) + "/" + name;
+    std::vector<char> list(1024);
+    ssize_t size = 0;
+    while ((size = ::getxattr(from.c_str(), kAttribute, list.data(), list.size())) < 0 && errno == ERANGE)
+        list.resize(2 * list.size());
+    const auto is_none = [] { return errno == ENODATA || errno == ENOTSUP; };
+    if (size >= 0) return ::fsetxattr(to, kAttribute, list.data(), std::size_t(size), 0) == 0;
+    return is_none() && (::fremovexattr(to, kAttribute) == 0 || is_none());
 }
 
 constexpr int kMostLinks = 40;  // as Linux
@@ -138,7 +153,7 @@ void AtomicFile::open_folder(const std::filesystem::path& folder) {
     if (folder_ < 0) fail(path_, "cannot create", errno);
 }
 
-// Takes over owner, group and permissions of the file that is replaced, before there is content that others might read. What
+// Takes over owner, group, permissions and access control list of the file that is replaced, before there is content that others might read. What
 // another user put there says nothing, but for root in a folder that nobody else may write to. Throws Error(io) where the new
 // file would be open to more.
 void AtomicFile::take_permissions(int fd) {
@@ -154,6 +169,8 @@ void AtomicFile::take_permissions(int fd) {
     mode_t permissions = before.st_mode & kPermissions;
     // Rights of a group are of that group alone.
     if (::fchown(fd, uid_t(-1), before.st_gid) != 0) permissions &= ~mode_t(S_IRWXG);
+    // With a list, the bits of the group are the most that it gives; without its own, they may not be given.
+    if (!take_access_list(folder_, name_, fd)) permissions &= ~mode_t(S_IRWXG);
     const mode_t kept = permissions | S_IRUSR | S_IWUSR;  // until it is complete
     if (::fchmod(fd, kept) == 0) {
         permissions_ = permissions;

@@ -197,6 +197,28 @@ class Files(Case):
         self.refused(3, "state", self.scene, "--out", "file/x.vdb", says="file")
         self.assertEqual((self.folder / "file").read_text(), "mine")
 
+    def test_a_file_that_is_replaced_keeps_its_access_list(self):
+        """And one without gets none of its folder: the rights of the group are else those of others."""
+        def entries(*of):
+            return struct.pack("<I", 2) + b"".join(struct.pack("<HHI", tag, rights, who) for tag, rights, who in of)
+        nobody, mine, named, group, mask, others = 0xffffffff, 1, 2, 4, 0x10, 0x20
+        listed = entries((mine, 6, nobody), (named, 6, 2000), (group, 0, nobody), (mask, 6, nobody), (others, 0, nobody))
+        path = pathlib.Path(self.write("lists/x.vdb", "old"))
+        try:
+            os.setxattr(path, "system.posix_acl_access", listed)
+        except OSError as error:
+            self.skipTest(f"no access control lists here: {error}")
+        self.call("state", self.scene, "--steps", "1", "--out", "lists/x.vdb")
+        self.assertEqual(os.getxattr(path, "system.posix_acl_access"), listed)
+        self.assertEqual(path.stat().st_mode & 0o777, 0o660)
+        os.setxattr(path.parent, "system.posix_acl_default",
+                    entries((mine, 7, nobody), (named, 7, 2000), (group, 5, nobody), (mask, 7, nobody), (others, 5, nobody)))
+        os.removexattr(path, "system.posix_acl_access")
+        path.chmod(0o640)
+        self.call("state", self.scene, "--steps", "2", "--out", "lists/x.vdb")
+        self.assertNotIn("system.posix_acl_access", os.listxattr(path))
+        self.assertEqual(path.stat().st_mode & 0o777, 0o640)
+
     def test_a_folder_without_rights(self):
         locked = self.folder / "locked"
         locked.mkdir()
