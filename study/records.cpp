@@ -46,7 +46,7 @@ void require_this_version(const Json& json, const std::filesystem::path& shard, 
                             "nephos makes versions {} and {}: {}",
                             shard.string(), found(statistics), found(stream), NEPHOS_STATISTICS_VERSION,
                             kRandomStreamVersion,
-                            use == RecordsFor::running
+                            use != RecordsFor::showing
                                 ? "choose another --out, or give --overwrite"
                                 : fmt::format("leave {0} out, or compute its runs again with `nephos sweep "
                                               "{0}/sweep.toml --out {0} --overwrite`",
@@ -136,10 +136,11 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
             problem = fmt::format("{}: the record at byte {} {}", path.string(), place, message);
     };
     std::vector<PlacedRecord> found;
-    bool torn = false;
+    bool torn = false, cut_short = false;
     for (std::string line; std::getline(stream, line); at += line.size() + 1) {
         if (torn) note(bytes, "is damaged, but others follow it");
-        torn = stream.eof() || !is_whole_record(line);
+        cut_short = stream.eof();
+        torn = cut_short || !is_whole_record(line);
         if (torn) continue;
         bytes = at + line.size() + 1;
         try {
@@ -160,6 +161,8 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
         }
     }
     check_reading(stream, path);
+    // What an append that was cut short left has no end of a line. Commands that go on write its run anew.
+    if (torn && use != RecordsFor::running && !cut_short) note(bytes, "is damaged");
     // Series are written before the records that name them: fewer are damage, and not to be filled with zeros. Their size is
     // asked for after the last record was read, as another process may be writing both.
     std::error_code error;
@@ -218,7 +221,7 @@ Records Records::read(const std::vector<std::filesystem::path>& folders, Records
         try {
             files = files_of_shards(folder);
         } catch (const Error& problem) {
-            if (use == RecordsFor::running) throw;
+            if (use != RecordsFor::showing) throw;
             records.problems_.emplace_back(problem.what());
         }
         for (const std::filesystem::path& file : files) {
@@ -226,7 +229,7 @@ Records Records::read(const std::vector<std::filesystem::path>& folders, Records
                 records.read_shard(file, use, checked);
             } catch (const ReadFailure& problem) {
                 // All runs of it would be done once more, though nothing is wrong with it.
-                if (use == RecordsFor::running) throw;
+                if (use != RecordsFor::showing) throw;
                 records.problems_.emplace_back(problem.what());
             } catch (const Error& problem) {
                 if (problem.code() != ErrorCode::io) throw;

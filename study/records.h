@@ -42,8 +42,9 @@ std::string failure_line(const PlannedRun& run, std::string_view message);
 
 // What the records are read for: it decides what helps against those of another version.
 enum class RecordsFor {
-    running,  // by a command that has --overwrite
-    showing,  // by one that writes no records
+    running,   // by a command that has --overwrite, and writes runs
+    counting,  // by the same with --status
+    showing,   // by one that writes no records
 };
 
 // Selects the records whose packed series are compared with their hashes, by their run's id; empty: all. It takes a pass over
@@ -58,7 +59,8 @@ class Records {
     static Records read(const std::vector<std::filesystem::path>& folders,
                         RecordsFor use = RecordsFor::running, const CheckedRuns& checked = {});
 
-    // "PATH: what is wrong", one a file; the torn last record of a shard is no problem. A run whose packed series are not as
+    // "PATH: what is wrong", one a file; the last record of a shard, where an append was cut short, is no
+    // problem; where it is damaged, it is one unless runs are written. A run whose packed series are not as
     // they were written is left out.
     const std::vector<std::string>& problems() const { return problems_; }
 

@@ -212,7 +212,7 @@ bool has_runs_of(const SweepPlan& plan, const std::filesystem::path& folder) {
 }
 
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job) {
-    return status_of(plan, job, Records::read({job.folder}));
+    return status_of(plan, job, Records::read({job.folder}, RecordsFor::counting));
 }
 
 SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,

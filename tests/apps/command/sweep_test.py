@@ -767,6 +767,23 @@ sd = 0.05
         self.call("merge", "two")
         self.assertEqual(self.tables("two"), before)
 
+    def test_a_damaged_last_record_is_named(self):
+        """What an append left that was cut short has no end of its line, and is written anew; a whole line that is damaged is told."""
+        self.sweep("one")
+        before = self.tables("one")
+        path, = (self.folder / "one/shards").glob("*.jsonl")
+        content = path.read_bytes()
+        path.write_bytes(content[:-9])
+        self.assertIn("1 of 9 runs are missing", self.call("merge", "one", "--out", "cut").stderr)
+        self.damage(path, -1)
+        path.write_bytes(content[:content.rindex(b"done")] + b"dome" + content[content.rindex(b"done") + 4:])
+        said = f"{path.name}: the record at byte {content[:-1].rindex(10) + 1} is damaged"
+        for command in (("merge", "one", "--out", "new"), ("report", "one", "-o", "a.html")):
+            self.assertIn(said, self.call(*command, status=3).stderr)
+        self.assertIn(said, self.sweep("one", "--status", status=3).stderr)
+        self.sweep("one")
+        self.assertEqual(self.tables("one"), before)
+
     def test_overwriting_a_shard_leaves_the_others(self):
         for shard in range(3):
             self.sweep("three", "--shard", f"{shard}/3")
