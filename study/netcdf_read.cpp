@@ -398,14 +398,18 @@ const FoundVariable& variable_named(const std::vector<FoundVariable>& variables,
 
 // A dimension with what its coordinate variable says. Values that lie beyond the end of the file are left out: no
 // other value depends on them.
+// The values of a coordinate variable follow each other, or those of the dimension of records at this distance.
 NetcdfAxis axis_of(Reader& reader, const std::vector<FoundVariable>& variables, std::uint64_t dimension,
-                   const NetcdfDimension& named, const std::filesystem::path& path) {
+                   const NetcdfDimension& named, std::optional<std::uint64_t> distance,
+                   const std::filesystem::path& path) {
     NetcdfAxis axis{named.name, named.size, {}, {}, {}, {}, {}, {}};
     const auto coordinate = std::ranges::find_if(variables, [&](const FoundVariable& variable) {
         return variable.name == named.name && variable.dimensions == std::vector{dimension};
     });
     if (coordinate == variables.end()) return axis;
-    const Attributes attributes = attributes_at(reader, coordinate->attributes_at, path);
+    FoundVariable variable = *coordinate;
+    variable.attributes = attributes_at(reader, coordinate->attributes_at, path);
+    const Attributes& attributes = variable.attributes;
     for (const auto& [name, to] :
          {std::pair("axis", &axis.axis), std::pair("standard_name", &axis.standard_name),
           std::pair("units", &axis.units), std::pair("positive", &axis.positive)}) {
@@ -414,13 +418,20 @@ NetcdfAxis axis_of(Reader& reader, const std::vector<FoundVariable>& variables, 
         *to = attribute->second.text;
         while (!to->empty() && (to->back() == '\0' || to->back() == ' ')) to->pop_back();
     }
-    if (named.size == 0 || coordinate->type == kCharacters) return axis;
-    const std::uint64_t bytes = size_of_type(coordinate->type, path), all = named.size * bytes;
-    if (named.size > reader.size() || coordinate->begin > reader.size() ||
-        all > reader.size() - coordinate->begin)
+    if (named.size == 0 || variable.type == kCharacters) return axis;
+    const std::uint64_t bytes = size_of_type(variable.type, path);
+    std::uint64_t to_last = 0;
+    if (__builtin_mul_overflow(named.size - 1, distance.value_or(bytes), &to_last) ||
+        variable.begin > reader.size() || to_last > reader.size() - variable.begin ||
+        bytes > reader.size() - variable.begin - to_last)
         return axis;
-    axis.first = value_at(reader, coordinate->begin, coordinate->type);
-    axis.last = value_at(reader, coordinate->begin + all - bytes, coordinate->type);
+    take_as_unsigned(variable);
+    const auto attribute = attributes.find("scale_factor");
+    const double scale = attribute != attributes.end() && !attribute->second.values.empty()
+                             ? attribute->second.values.front()
+                             : 1;
+    axis.first = scale * value_at(reader, variable.begin, variable.type);
+    axis.last = scale * value_at(reader, variable.begin + to_last, variable.type);
     return axis;
 }
 
@@ -486,6 +497,11 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
             ++record_variables;
         }
     }
+    // Records of a file's only record variable follow each other without padding (NetCDF classic format, note on vsize).
+    const auto distance_of = [&](const NetcdfDimension& dimension) {
+        const bool is_apart = dimension.size == 0 && record_variables > 1;
+        return is_apart ? std::optional(record_bytes) : std::nullopt;
+    };
     const FoundVariable* found = &variable_named(variables, name, path);
     Variable& data = *variable_;
     std::uint64_t count = 1;
@@ -494,11 +510,10 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
         const std::uint64_t size = dimension.size == 0 ? records : dimension.size;
         // Those of more dimensions are no mask, and nobody asks for their coordinates.
         constexpr std::size_t kMostOfMask = 4;  // time, z, y, x
-        data.axes.push_back(
-            found->dimensions.size() > kMostOfMask
-                ? NetcdfAxis{dimension.name, size, {}, {}, {}, {}, {}, {}}
-                : axis_of(reader, variables, found->dimensions[n], {dimension.name, dimension.size}, path));
-        data.axes.back().size = size;
+        data.axes.push_back(found->dimensions.size() > kMostOfMask
+                                ? NetcdfAxis{dimension.name, size, {}, {}, {}, {}, {}, {}}
+                                : axis_of(reader, variables, found->dimensions[n], {dimension.name, size},
+                                          distance_of(dimension), path));
         if (size == 0 || count > reader.size() / size)
             throw Error(ErrorCode::io, path.string() + ": is damaged or empty");
         count *= size;

@@ -212,6 +212,24 @@ class Stats(Case):
             self.check(json.loads(result.stdout), mask, 50, 20)
             self.assertEqual("z.nc: the levels of the variable ql go downwards, and are turned over" in result.stderr, down)
 
+    def test_levels_that_are_records_or_packed_are_turned_over_likewise(self):
+        mask = random_mask(10, (1, 6, 12, 20), 0.03)
+        for kind, values, attributes, down in (("f8", numpy.arange(6.0), {"positive": "down"}, True), ("f8", numpy.arange(6.0), {"units": "m"}, False),
+                                               ("i2", numpy.arange(6), {"units": "m", "scale_factor": -1.0}, True),
+                                               ("i1", [100, 110, 120, -126, -116, -106], {"units": "m", "_Unsigned": "true"}, False)):
+            for levels in (6, None):
+                with netcdf_file(self.folder / "r.nc", "w") as file:
+                    for name, count in (("lev", levels), ("y", 12), ("x", 20)):
+                        file.createDimension(name, count)
+                    lev, ql = file.createVariable("lev", kind, ("lev",)), file.createVariable("ql", "f8", ("lev", "y", "x"))
+                    for name, value in attributes.items():
+                        setattr(lev, name, value)
+                    lev[:] = numpy.asarray(values)
+                    ql[:] = (mask[0, ::-1] if down else mask[0]) * 1.0
+                result = self.call("stats", "r.nc", "--cell-size", "50", "--level-height", "20", "--json")
+                self.check(json.loads(result.stdout), mask, 50, 20)
+                self.assertEqual("go downwards, and are turned over" in result.stderr, down, (attributes, levels))
+
     def test_values_that_are_missing_are_no_cloud(self):
         """Of 30 x 50 values every fifth is cloud, and 7 columns are missing, by each way to say so."""
         mask = random_mask(5, (30, 50), 0.2)
