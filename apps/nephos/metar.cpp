@@ -196,8 +196,11 @@ void add_metar_command(CLI::App& app, Action& action) {
         ->type_name("FILE");
     command->add_flag("--explain", a->explain, "Only say what each group means and becomes");
     CLI::Option* run = command->add_flag("--run", a->run, "Also simulate the scene and draw it");
-    command->add_option("--out", a->folder, "Folder of the run (default: out/NAME)")->type_name("DIR");
-    command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics");
+    command->add_option("--out", a->folder, "Folder of the run (default: out/NAME)")
+        ->type_name("DIR")
+        ->needs(run);
+    command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics")
+        ->needs(run);
     command->add_flag("--resume", a->resume, "Go on with the interrupted run in the folder")->needs(run);
     command->add_flag("--overwrite", a->overwrite, "Remove the run in the folder first")->needs(run);
     command

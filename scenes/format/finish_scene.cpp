@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "density/grid_names.h"
 #include "render/options/height_format.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
@@ -195,19 +196,13 @@ void place_sun(const SectionReader& reader, Scene& scene) {
     sun.longitude_deg = place.longitude_deg;
 }
 
-// Names of grids are taken for paths by some programs.
 void check_velocity_name(const SectionReader& reader, const Scene& scene) {
     const std::string& name = scene.density_files.velocity_name;
-    const auto allowed = [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
-    };
     if (!reader.sound({"density"})) return;
     const SectionReader density = section_or_scene(reader, "density");
-    const bool good = !name.empty() && name.size() <= 60 && std::all_of(name.begin(), name.end(), allowed);
-    if (!good || name == "density" || name == "hum" || name == "act" || name == "cld") {
-        density.report(
-            "velocity_name", "`density.velocity_name` is \"" + shortened(name) + "\"",
-            "expected up to 60 letters, digits or `_` that name no other grid, such as \"velocity\"");
+    if (!is_name_of_wind(name)) {
+        density.report("velocity_name", "`density.velocity_name` is \"" + shortened(name) + "\"",
+                       "expected " + std::string(kExpectedNameOfWind));
     }
     if (!scene.density_files.per_layer && !scene.density_files.combined && !scene.layers.empty()) {
         density.report("combined", "neither `density.per_layer` nor `density.combined` is true",

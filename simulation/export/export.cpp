@@ -16,6 +16,8 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "density/export/containers.h"
+#include "density/grid_names.h"
+#include "scenes/format/text.h"
 #include "simulation/export/export_list.h"
 #include "simulation/export/frame_export.h"
 #include "simulation/export/sequence.h"
@@ -35,6 +37,9 @@ void check_options(const ExportOptions& o) {
         throw Error(ErrorCode::usage, "--voxel excludes --size and --budget");
     if (o.largest_side && o.budget_bytes)
         throw Error(ErrorCode::usage, "--size and --budget exclude each other");
+    if (!o.velocity_name.empty() && !is_name_of_wind(o.velocity_name))
+        throw Error(ErrorCode::usage, "--velocity: \"" + shortened(o.velocity_name) + "\": expected " +
+                                          std::string(kExpectedNameOfWind));
     for (const ExportFormat format : all_formats(o)) {
         const VoxelType type = type_of(o, format);
         const bool whole = type == VoxelType::r8 || type == VoxelType::r16;

@@ -581,6 +581,8 @@ class Export(Case):
                 (["--to", "vti", "--mips"], "--mips: is for raw, dds, ktx2 and bricks, and of no effect in vti"),
                 (["--to", "raw", "--zip"], "--zip: is for vti and nvdb"), (["--to", "raw", "--quantise", "fp8"], "--quantise: is for nvdb"),
                 (["--to", "ktx2", "--legacy-dds"], "--legacy-dds: is for dds"), (["--to", "raw", "--velocity", "vel"], "--velocity: is for usd and vdb"),
+                *[(["--to", "vdb", "--velocity", name], f"--velocity: \"{said}\": expected up to 60 letters")
+                  for name, said in (("density", "density"), ("a b", "a b"), ("v\x1b[31m", "v\ufffd[31m"))],
                 (["--to", "nvdb", "--type", "r8"], "--type r8: is for raw"), (["--to", "vdb", "--axes", "unity"], "--axes: is for raw"),
                 (["--to", "vdb", "--border", "zero"], "--border"), (["--to", "nvdb", "--pad", "8"], "--pad"), (["--to", "nvdb", "--range", "auto"], "--range auto"),
                 (["--to", "raw", "--bricks", "16"], "--bricks: is for bricks"), (["--for", "xplane", "--voxel", "100"], "--voxel"),
