@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <iterator>
+#include <optional>
 
 #include "core/error.h"
 #include "scenes/format/text.h"
@@ -194,7 +196,30 @@ Change missing_key(std::string_view text, const TomlNode& root, const TextPath& 
     return added_key(text, table, dotted(path, reached.steps), value);
 }
 
+// Returns whether two values are written alike or, of up to 2^53, as the same number: `1.0e3` stays where 1000 is set.
+bool is_same_number(std::string_view a, std::string_view b) {
+    const auto number_of = [](std::string_view text) -> std::optional<double> {
+        std::string plain;
+        for (const char c : text)
+            if (c != '_') plain += c;
+        if (plain.starts_with('+')) plain.erase(0, 1);
+        double number = 0;
+        const auto [end, error] = std::from_chars(plain.data(), plain.data() + plain.size(), number);
+        constexpr double kLargestWhole = 9007199254740992;
+        if (plain.empty() || error != std::errc() || end != plain.data() + plain.size() ||
+            !(std::abs(number) < kLargestWhole))
+            return std::nullopt;
+        return number;
+    };
+    if (a == b) return true;
+    const std::optional<double> first = number_of(a);
+    return first && first == number_of(b) && std::signbit(*first) == std::signbit(*number_of(b));
+}
+
 std::vector<Change> replaced_value(std::string_view text, const TomlNode& node, std::string_view value) {
+    if (node.form == Form::value &&
+        is_same_number(text.substr(node.value.begin, node.value.end - node.value.begin), value))
+        return {};
     if (node.form != Form::array || !value.starts_with('[')) return {{node.value, std::string(value)}};
     const std::string whole = "v = " + std::string(value);
     const TomlNode parsed = toml_tree(whole);
@@ -204,9 +229,43 @@ std::vector<Change> replaced_value(std::string_view text, const TomlNode& node, 
     for (std::size_t n = 0; n < items.size(); ++n) {
         const TextRegion was = node.items[n].value, now = items[n].value;
         const std::string by = whole.substr(now.begin, now.end - now.begin);
-        if (text.substr(was.begin, was.end - was.begin) != by) changes.push_back({was, by});
+        if (!is_same_number(text.substr(was.begin, was.end - was.begin), by)) changes.push_back({was, by});
     }
     return changes;
+}
+
+// Returns the text with some items of an array more or less, and all else in it as it was, comments too; nothing where others changed.
+std::optional<std::string> with_items(std::string_view text, const TextPath& path, const TomlNode& node,
+                                      std::string_view value) {
+    if (node.form != Form::array || !value.starts_with('[')) return std::nullopt;
+    const std::string whole = "v = " + std::string(value);
+    const TomlNode parsed = toml_tree(whole);
+    const std::vector<TomlNode>&was = node.items, &now = parsed.find("v")->items;
+    if (was.empty() || now.empty() || was.size() == now.size()) return std::nullopt;
+    const auto text_of = [](std::string_view in, const TomlNode& item) {
+        return in.substr(item.value.begin, item.value.end - item.value.begin);
+    };
+    const std::size_t fewer = std::min(was.size(), now.size());
+    std::size_t before = 0, behind = 0;
+    while (before < fewer && is_same_number(text_of(text, was[before]), text_of(whole, now[before])))
+        ++before;
+    while (behind < fewer - before && is_same_number(text_of(text, was[was.size() - 1 - behind]),
+                                                     text_of(whole, now[now.size() - 1 - behind])))
+        ++behind;
+    if (before + behind < fewer) return std::nullopt;
+    std::string out(text);
+    if (now.size() < was.size()) {
+        TextPath item = path;
+        item.push_back({{}, before});
+        for (std::size_t n = now.size(); n < was.size(); ++n) out = without(out, item);
+        return out;
+    }
+    std::string more;
+    for (std::size_t n = before; n < now.size() - behind; ++n) {
+        const std::string item(text_of(whole, now[n]));
+        more += before > 0 ? ", " + item : item + ", ";
+    }
+    return out.insert(before > 0 ? was[before - 1].value.end : was.front().value.begin, more);
 }
 
 // Where the comma after an element ends, without skipping a comment; the element's end when there is none.
@@ -377,6 +436,7 @@ std::string with_value(std::string_view text, const TextPath& path, std::string_
     if (reached.steps < path.size()) return applied(text, {missing_key(text, root, path, reached, value)});
     const TomlNode& node = *reached.node;
     if (node.form == Form::value || node.form == Form::array || node.form == Form::inlined) {
+        if (std::optional<std::string> items = with_items(text, path, node, value)) return *std::move(items);
         return applied(text, replaced_value(text, node, value));
     }
     refuse(path, "is a table: its keys are set one by one");

@@ -78,6 +78,35 @@ testing::AssertionResult is_toml(const std::string& text) {
     return testing::AssertionFailure() << format(document.problems) << text;
 }
 
+TEST(TomlEdit, NumbersThatStayAreWrittenAsTheyWere) {
+    const std::string text = "a = [1.0e3, -3_200.5, 2] # place\nb = 1.50\nc = 0x2A\n";
+    EXPECT_EQ(with_value(text, text_path("a"), "[1000, -3200.5, 5]"),
+              "a = [1.0e3, -3_200.5, 5] # place\nb = 1.50\nc = 0x2A\n");
+    EXPECT_EQ(with_value(text, text_path("b"), "1.5"), text);
+    EXPECT_EQ(with_value(text, text_path("b"), "1.25"),
+              "a = [1.0e3, -3_200.5, 2] # place\nb = 1.25\nc = 0x2A\n");
+    EXPECT_EQ(with_value("z = 0.0", text_path("z"), "-0.0"), "z = -0.0");
+    EXPECT_EQ(with_value("z = 9007199254740993", text_path("z"), "9007199254740992"), "z = 9007199254740992");
+}
+
+TEST(TomlEdit, ItemsOfAnArrayComeAndGoBesideComments) {
+    const std::string text = "skies = [\n    \"few\", # of few\n    \"many\", # of many\n    \"rain\",\n]\n";
+    const TextPath path = text_path("skies");
+    EXPECT_EQ(with_value(text, path, "[\"few\", \"many\", \"new\", \"rain\"]"),
+              "skies = [\n    \"few\", # of few\n    \"many\", \"new\", # of many\n    \"rain\",\n]\n");
+    EXPECT_EQ(with_value(text, path, "[\"new\", \"few\", \"many\", \"rain\"]"),
+              "skies = [\n    \"new\", \"few\", # of few\n    \"many\", # of many\n    \"rain\",\n]\n");
+    const std::string fewer = with_value(text, path, "[\"few\", \"rain\"]");
+    EXPECT_NE(fewer.find("# of few"), std::string::npos) << fewer;
+    Document document;
+    const std::optional<Node> read = document.parse(document.add_origin("fewer", fewer, true));
+    ASSERT_TRUE(read) << fewer;
+    ASSERT_EQ(read->find("skies")->value.items.size(), 2u) << fewer;
+    EXPECT_EQ(with_value(fewer, path, "[\"few\", \"many\", \"rain\"]").find("many") != std::string::npos,
+              true);
+    EXPECT_EQ(with_value(text, path, "[\"x\", \"y\"]"), "skies = [\"x\", \"y\"]\n");
+}
+
 TEST(TomlEdit, SettingWhatIsThereChangesNoByte) {
     for (const fs::path& path : shipped_scenes()) {
         SCOPED_TRACE(path.string());
