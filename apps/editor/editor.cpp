@@ -208,6 +208,7 @@ int loop(Editor& editor, Report& report) {
     std::string title;
     Clock::time_point last_frame = Clock::now(), last_input = Clock::now(), last_results;
     bool screenshot_due = !editor.options.screenshot.empty();
+    std::vector<std::filesystem::path> dropped;
     while (!editor.quit) {
         if (const int signal = pending_signal(); signal != 0) {
             const std::string failures = autosave_all(editor);
@@ -236,6 +237,11 @@ int loop(Editor& editor, Report& report) {
         const double interval = seconds_since(last_frame);
         last_frame = Clock::now();
         if (scripted && script.is_active()) script.apply(editor);
+        for (std::filesystem::path& path : editor.window->take_dropped()) dropped.push_back(std::move(path));
+        if (!dropped.empty() && !press_enter_in_field()) {  // likewise
+            for (const std::filesystem::path& path : dropped) ask_before(editor, Pending::open, path);
+            dropped.clear();
+        }
         finish_field_first();
         ImGui::NewFrame();
         const ImGuiIO& io = ImGui::GetIO();
@@ -247,8 +253,6 @@ int loop(Editor& editor, Report& report) {
         report.watch(editor);
         look_after_files(editor);
         watch_export(editor);
-        for (const std::filesystem::path& path : editor.window->take_dropped())
-            ask_before(editor, Pending::open, path);
         draw_interface(editor);
         update_title(editor, title);
         if (script.is_random()) editor.quit = false;

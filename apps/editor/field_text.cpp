@@ -16,15 +16,20 @@
 namespace nephos {
 namespace {
 
-constexpr unsigned kFirstPrivate = 0xE000, kLastPrivate = 0xF8FF, kLastOfField = 0xFFFF;
+// ImGui takes no private characters of the keyboard: those of the field are of scripts that its font does not have (Yi, Vai, Bamum
+// and their neighbours).
+constexpr unsigned kFirstOfTable = 0xA000, kLastOfTable = 0xABFF, kFirstPrivate = 0xE000,
+                   kLastPrivate = 0xF8FF;
+constexpr unsigned kLastOfField = 0xFFFF;
 
 bool needs_another(unsigned code) {
-    return code > kLastOfField || (code >= kFirstPrivate && code <= kLastPrivate);
+    return code > kLastOfField || (code >= kFirstPrivate && code <= kLastPrivate) ||
+           (code >= kFirstOfTable && code <= kLastOfTable);
 }
 
 // Holds the table of all fields: ImGui has one context, too.
 struct Table {
-    std::map<unsigned, unsigned> fields;  // private characters by what they stand for
+    std::map<unsigned, unsigned> fields;  // characters of the table by what they stand for
     std::vector<unsigned> codes;          // the n-th of them stands for
 };
 
@@ -199,9 +204,9 @@ struct Clipboard {
 unsigned field_character(unsigned code) {
     if (!needs_another(code)) return code;
     Table& all = table();
-    const auto [found, added] = all.fields.try_emplace(code, kFirstPrivate + unsigned(all.codes.size()));
+    const auto [found, added] = all.fields.try_emplace(code, kFirstOfTable + unsigned(all.codes.size()));
     if (!added) return found->second;
-    if (found->second > kLastPrivate) {
+    if (found->second > kLastOfTable) {
         constexpr unsigned kReplacement = 0xFFFD;
         all.fields.erase(found);
         return kReplacement;
@@ -215,8 +220,8 @@ std::string field_text(std::string_view text) { return replaced(text, field_char
 std::string text_of_field(std::string_view field) {
     return replaced(field, [](unsigned code) {
         const std::vector<unsigned>& codes = table().codes;
-        const bool is_known = code <= kLastPrivate && code - kFirstPrivate < codes.size();
-        return is_known ? codes[code - kFirstPrivate] : code;
+        const bool is_known = code >= kFirstOfTable && code - kFirstOfTable < codes.size();
+        return is_known ? codes[code - kFirstOfTable] : code;
     });
 }
 
@@ -308,6 +313,24 @@ bool input_text(const char* label, std::string& text, const char* hint, ImGuiInp
         return hint == nullptr ? ImGui::InputText(label, &field, flags | more)
                                : ImGui::InputTextWithHint(label, hint, &field, flags | more);
     });
+}
+
+bool input_value(const char* label, std::string& text, ImGuiInputTextFlags flags) {
+    const ImGuiID id = ImGui::GetCurrentWindow()->GetID(label);
+    std::string shown = text;
+    const std::string field = field_text(text);
+    forget_other_text(id, field);
+    const LastField before = last_field();
+    const bool was_active = ImGui::GetActiveID() == id;
+    input_text(label, shown, nullptr, flags);
+    if (ImGui::GetActiveID() == id) return false;
+    // A window that opens takes the caret away between two frames, and ImGui then forgets what was typed. Escape does so in the field.
+    if (!was_active && before.id == id && before.given == field && before.taken != field)
+        shown = text_of_field(before.taken);
+    if (shown == text) return false;
+    last_field().id = 0;
+    text = std::move(shown);
+    return true;
 }
 
 bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGuiInputTextFlags flags) {

@@ -3,9 +3,9 @@
 
 // Text in the fields of Dear ImGui, for any text. Its packaged library has characters of 16 bits and lines that end with "\n":
 // a character beyond U+FFFF (a symbol of weather, say) would be replaced for good by U+FFFD, and what is typed at the end of a
-// line with "\r\n" would stand behind the "\r". In fields, private characters (U+E000 to U+F8FF) stand for those beyond, and
-// for the private ones of a text. There is one table of them, so that texts can be copied between fields; all functions are
-// for the thread that draws.
+// line with "\r\n" would stand behind the "\r". In fields, characters from U+A000 to U+ABFF stand for those beyond, for private
+// ones (U+E000 to U+F8FF), which it takes of no keyboard, and for those of this range. There is one table of them, so that texts can
+// be copied between fields; all functions are for the thread that draws.
 
 #include <string>
 #include <string_view>
@@ -14,7 +14,7 @@
 
 namespace nephos {
 
-// Return a text as a field holds it, and the text of a field. A text beyond the table's 6,400 characters does not come back.
+// Return a text as a field holds it, and the text of a field. A text beyond the table's 3,072 characters does not come back.
 std::string field_text(std::string_view text);
 std::string text_of_field(std::string_view field);
 // Returns the character that stands for one that is typed.
@@ -27,6 +27,10 @@ unsigned field_character(unsigned code);
 // hold, as it has a byte of 0 or is no UTF-8, is read-only.
 bool input_text(const char* label, std::string& text, const char* hint = nullptr,
                 ImGuiInputTextFlags flags = 0);
+
+// Shows a value in a field of one line. Returns true in the frame after the field was left with another text, by Enter, Tab, a click or a
+// window that opens over it; only then `text` is changed, to what was typed. Escape brings back what was there.
+bool input_value(const char* label, std::string& text, ImGuiInputTextFlags flags = 0);
 
 // As ImGui::InputTextMultiline(), but returns whether the text was changed. Lines keep their ends; what is added has those of
 // the first line.

@@ -188,7 +188,10 @@ void status_bar(Editor& editor) {
     } else if (fresh && !editor.message.empty()) {
         if (editor.message_is_bad) ImGui::PushStyleColor(ImGuiCol_Text, red);
         ImGui::TextUnformatted(editor.message.substr(0, 200).c_str());
-        if (editor.message_is_bad) ImGui::PopStyleColor();
+        if (editor.message_is_bad) {
+            ImGui::PopStyleColor();
+            editor.controls.note("refusal");
+        }
     } else {
         ImGui::TextDisabled(
             "%s", editor.document->has_file() ? editor.document->path().string().c_str() : "not saved yet");

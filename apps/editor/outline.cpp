@@ -223,7 +223,8 @@ void outline_panel(Editor& editor) {
 
     const bool is_element = !editor.selected.empty() && editor.selected.back().name.empty();
     const bool typing = ImGui::GetIO().WantTextInput;
-    if (is_element && !typing && value_node(editor.document->values(), editor.selected) != nullptr) {
+    if (is_element && !typing && !is_asking(editor) &&
+        value_node(editor.document->values(), editor.selected) != nullptr) {
         const TextPath array(editor.selected.begin(), editor.selected.end() - 1);
         const std::size_t index = editor.selected.back().index;
         const bool here = ImGui::IsWindowFocused(ImGuiFocusedFlags_ChildWindows);

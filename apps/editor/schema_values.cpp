@@ -6,6 +6,7 @@
 #include <cctype>
 #include <utility>
 
+#include "core/error.h"
 #include "scenes/format/text.h"
 #include "scenes/format/writer.h"
 
@@ -253,31 +254,55 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
     return entries;
 }
 
+namespace {
+
+// Adds the paths of texts that are `name` at places such as "sky.*.models", where "*" stands for all elements of an array; of an array of
+// texts at the end, those of its elements.
+void add_users(const Node& node, std::string_view places, const std::string& name, const TextPath& path,
+               std::vector<TextPath>& users) {
+    const auto below = [&path](TextStep step) {
+        TextPath longer = path;
+        longer.push_back(std::move(step));
+        return longer;
+    };
+    if (places.empty() && node.kind == Node::Kind::text && node.text == name) users.push_back(path);
+    if (places.empty() || places.front() == '*') {
+        const std::string_view rest =
+            places.empty() ? places : places.substr(std::min<std::size_t>(2, places.size()));
+        for (std::size_t n = 0; n < node.items.size(); ++n)
+            add_users(node.items[n], rest, name, below({{}, n}), users);
+        return;
+    }
+    const std::size_t end = std::min(places.find('.'), places.size());
+    const std::string key(places.substr(0, end));
+    const Entry* entry = node.find(key);
+    if (entry != nullptr)
+        add_users(entry->value, places.substr(std::min(end + 1, places.size())), name, below({key, 0}),
+                  users);
+}
+
+}  // namespace
+
 std::string with_new_name(std::string text, const Node& values, const TextPath& path,
                           const std::string& name) {
     const Node* old = value_node(values, path);
     const std::string was = old != nullptr ? old->text : "";
+    const std::vector<std::string> taken =
+        path.size() == 3 ? names_of(value_node(values, {path.front()})) : std::vector<std::string>();
+    if (name != was && std::ranges::count(taken, name) > 0)
+        throw Error(ErrorCode::usage, "Not renamed: there is another \"" + shortened(name) + "\" already");
     text = with_value(text, path, toml_string(name));
     const bool of_model = path.size() == 3 && path[0].name == "model";
     const bool of_sky = path.size() == 3 && path[0].name == "sky";
-    if (was.empty() || (!of_model && !of_sky)) return text;
-    const std::string array = of_model ? "sky" : "layer", key = of_model ? "models" : "skies";
-    const Node* users = value_node(values, {{array, 0}});
-    if (users == nullptr) return text;
-    for (std::size_t n = 0; n < users->items.size(); ++n) {
-        const Entry* list = users->items[n].find(key);
-        if (list == nullptr) continue;
-        const TextPath at{{array, 0}, {{}, n}, {key, 0}};
-        if (list->value.kind == Node::Kind::text && list->value.text == was) {
-            text = with_value(text, at, toml_string(name));
-        }
-        for (std::size_t item = 0; item < list->value.items.size(); ++item) {
-            if (list->value.items[item].text != was) continue;
-            TextPath to = at;
-            to.push_back({{}, item});
-            text = with_value(text, to, toml_string(name));
-        }
-    }
+    // Of two elements of one name nobody knows which one is meant.
+    if (was.empty() || (!of_model && !of_sky) || std::ranges::count(taken, was) > 1) return text;
+    const std::vector<std::string> uses =
+        of_sky ? std::vector<std::string>{"layer.*.skies"}
+               : std::vector<std::string>{"sky.*.models", "layer.*.rain.attached.*.model",
+                                          "layer.*.metamorphoses.*.from", "layer.*.metamorphoses.*.to"};
+    std::vector<TextPath> users;
+    for (const std::string& use : uses) add_users(values, use, was, {}, users);
+    for (const TextPath& user : users) text = with_value(text, user, toml_string(name));
     return text;
 }
 

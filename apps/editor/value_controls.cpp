@@ -2,6 +2,7 @@
 #include "apps/editor/value_controls.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <functional>
 
@@ -20,6 +21,13 @@ double number_of(const Node& node) {
     return node.kind == Node::Kind::integer ? double(node.integer) : node.number;
 }
 
+// Precondition: of number_text().
+double number_of_text(const std::string& text) {
+    double number = 0;
+    std::from_chars(text.data(), text.data() + text.size(), number);
+    return number;
+}
+
 std::vector<double> numbers_of(const Node* node, std::size_t count) {
     std::vector<double> out;
     if (node != nullptr && node->kind == Node::Kind::array) {
@@ -36,16 +44,25 @@ std::string number_list(const std::vector<double>& numbers, bool integers) {
     std::string out = numbers.size() > 1 ? "[" : "";
     for (std::size_t n = 0; n < numbers.size(); ++n) {
         if (n > 0) out += ", ";
-        out += integers ? std::to_string(std::llround(numbers[n])) : number_text(numbers[n], 7);
+        out += integers ? std::to_string(std::llround(numbers[n])) : number_text(numbers[n]);
     }
     return numbers.size() > 1 ? out + "]" : out;
 }
 
+// Returns as many digits as the number has, at least six: a field that is typed into begins with what it shows, and a drag is rounded
+// to as many.
+std::string number_format(double number) {
+    int digits = 6;
+    while (digits < 17 && std::isfinite(number) && number_of_text(number_text(number, digits)) != number)
+        ++digits;
+    return "%." + std::to_string(digits) + "g";
+}
+
 // "%.6g m": a percent sign of a unit would be read as a format.
-std::string format_of(const Key& key, bool integers) {
+std::string format_of(const Key& key, double number, bool integers) {
     std::string unit = key.unit == "per step" || key.unit == "cells" ? "" : unit_sign(key.unit);
     std::erase(unit, '%');
-    return std::string(integers ? "%.0f" : "%.6g") + (unit.empty() || unit == "°" ? unit : " " + unit);
+    return (integers ? "%.0f" : number_format(number)) + (unit.empty() || unit == "°" ? unit : " " + unit);
 }
 
 // Returns how far a drag of one pixel goes: at most a 300th of a small range, otherwise 0.006 of the number's size.
@@ -63,28 +80,24 @@ bool is_slider(const Key& key) {
     return std::isfinite(range) && range <= 400 && range > 0 && key.unit != "per step";
 }
 
-void within_limits(const Key& key, std::vector<double>& numbers) {
-    for (double& number : numbers) {
-        if (std::isnan(number)) number = 0;
-        if (key.limits.infinite && std::isinf(number)) continue;
-        const double room =
-            std::min(1e-3, std::isfinite(key.limits.max) ? 1e-3 * (key.limits.max - key.limits.min) : 1e-3);
-        const double low = key.limits.above_min ? key.limits.min + room : key.limits.min;
-        const double high = key.limits.below_max ? key.limits.max - room : key.limits.max;
-        number = std::clamp(number, low, high);
-    }
+double within_limits(const Limits& limits, double number) {
+    if (std::isnan(number)) number = 0;
+    if (limits.infinite && std::isinf(number)) return number;
+    const double room = std::min(1e-3, std::isfinite(limits.max) ? 1e-3 * (limits.max - limits.min) : 1e-3);
+    if (limits.above_min && number <= limits.min) return limits.min + room;
+    if (limits.below_max && number >= limits.max) return limits.max - room;
+    return std::clamp(number, limits.min, limits.max);
 }
 
 // To a power of ten that is at most `step`.
 double rounded(double number, double step) {
     if (!std::isfinite(number) || !(step > 0)) return number;
     const double unit = std::pow(10.0, std::floor(std::log10(step)));
-    return std::round(number / unit) * unit;
+    return number_of_text(number_text(std::round(number / unit) * unit, 9));  // 0.3, not 0.30000000000000004
 }
 
 // A field for each number, each with a name of its own: "size_m[2]".
-bool drag_numbers(Editor& editor, const ValueRow& row, std::vector<double>& numbers, const char* format,
-                  bool integers) {
+bool drag_numbers(Editor& editor, const ValueRow& row, std::vector<double>& numbers, bool integers) {
     const float gap = ImGui::GetStyle().ItemInnerSpacing.x, count = float(numbers.size());
     const float width =
         std::max(1.0f, std::floor((ImGui::GetContentRegionAvail().x - (count - 1) * gap) / count));
@@ -95,7 +108,11 @@ bool drag_numbers(Editor& editor, const ValueRow& row, std::vector<double>& numb
         if (n > 0) ImGui::SameLine(0, gap);
         ImGui::PushID(int(n));
         ImGui::SetNextItemWidth(width);
-        changed |= ImGui::DragScalar("##number", ImGuiDataType_Double, &numbers[n], speed, nullptr, nullptr, format);
+        const std::string format = numbers.size() < 3 ? format_of(row.key, numbers[n], integers)
+                                   : integers         ? "%.0f"
+                                                      : number_format(numbers[n]);
+        changed |= ImGui::DragScalar("##number", ImGuiDataType_Double, &numbers[n], speed, nullptr, nullptr,
+                                     format.c_str());
         if (numbers.size() > 1) editor.controls.note(path_text(row.path) + "[" + std::to_string(n) + "]");
         ImGui::PopID();
     }
@@ -106,8 +123,8 @@ bool drag_numbers(Editor& editor, const ValueRow& row, std::vector<double>& numb
 // Numbers side by side. Returns the new value as TOML.
 std::optional<std::string> edit_numbers(Editor& editor, const ValueRow& row, std::size_t count,
                                         bool integers) {
-    std::vector<double> numbers = numbers_of(row.node, count);
-    const std::string format = format_of(row.key, integers);
+    const std::vector<double> before = numbers_of(row.node, count);
+    std::vector<double> numbers = before;
     bool changed = false;
     if (count == 1 && row.key.limits.infinite) {
         bool infinite = std::isinf(numbers[0]);
@@ -121,23 +138,24 @@ std::optional<std::string> edit_numbers(Editor& editor, const ValueRow& row, std
         if (infinite) {
             ImGui::TextDisabled("no end");
             if (!changed) return std::nullopt;
-            return number_text(numbers[0], 7);
+            return number_text(numbers[0]);
         }
     }
     ImGui::SetNextItemWidth(-1);
     if (count == 1 && is_slider(row.key)) {
         const double low = row.key.limits.min, high = row.key.limits.max;
-        changed |=
-            ImGui::SliderScalar("##value", ImGuiDataType_Double, numbers.data(), &low, &high, format.c_str());
+        changed |= ImGui::SliderScalar("##value", ImGuiDataType_Double, numbers.data(), &low, &high,
+                                       format_of(row.key, numbers[0], integers).c_str());
     } else {
-        changed |= drag_numbers(editor, row, numbers, count > 2 ? (integers ? "%.0f" : "%.5g") : format.c_str(),
-                                integers);
+        changed |= drag_numbers(editor, row, numbers, integers);
     }
     if (!changed) return std::nullopt;
-    if (!ImGui::GetIO().WantTextInput && !integers) {  // by the mouse: no more digits than a pixel means
-        for (double& number : numbers) number = rounded(number, drag_speed(row.key, number, false));
+    const bool by_mouse = !ImGui::GetIO().WantTextInput;
+    for (std::size_t n = 0; n < count; ++n) {
+        if (numbers[n] == before[n]) continue;  // one of several stays as it is, with all its digits
+        if (by_mouse && !integers) numbers[n] = rounded(numbers[n], drag_speed(row.key, numbers[n], false));
+        numbers[n] = within_limits(row.key.limits, numbers[n]);
     }
-    within_limits(row.key, numbers);
     const bool one_for_both =
         count == 2 && row.node != nullptr && row.node->kind != Node::Kind::array && row.present;
     if (one_for_both && numbers[0] == numbers[1]) numbers.resize(1);
@@ -175,14 +193,20 @@ std::optional<std::string> edit_text(Editor& editor, const ValueRow& row) {
         text = std::to_string(row.node->integer);
     ImGui::BeginGroup();
     ImGui::SetNextItemWidth(width_before_file_button(row));
-    input_text("##value", text);
-    const bool typed = ImGui::IsItemDeactivatedAfterEdit();
+    const bool typed = input_value("##value", text);
     file_choice(editor, row, [](const std::string& name) { return toml_string(name); });
     ImGui::EndGroup();
     if (!typed) return std::nullopt;
     if (row.key.kind == KeyKind::seed) {
         std::uint64_t seed = 0;
-        if (!parse_seed(text, seed)) return std::nullopt;
+        if (!parse_seed(text, seed)) {
+            say(editor,
+                "\"" + shortened(text) +
+                    "\" is no seed: expected a number from 0 to 18446744073709551615, or 0x and hexadecimal "
+                    "digits",
+                true);
+            return std::nullopt;
+        }
         const bool plain = seed <= 0x7fffffffffffffff && !text.starts_with("0x");
         return plain ? std::to_string(seed) : toml_string(text);
     }
@@ -224,13 +248,18 @@ std::optional<std::string> edit_boundaries(const ValueRow& row) {
 
 std::optional<std::string> edit_colour(const ValueRow& row) {
     const std::vector<double> numbers = numbers_of(row.node, 3);
-    float colour[3] = {float(numbers[0]), float(numbers[1]), float(numbers[2])};
+    const float before[3] = {float(numbers[0]), float(numbers[1]), float(numbers[2])};
+    float colour[3] = {before[0], before[1], before[2]};
     ImGui::SetNextItemWidth(-1);
     if (!ImGui::ColorEdit3("##value", colour, ImGuiColorEditFlags_Float | ImGuiColorEditFlags_HDR))
         return std::nullopt;
-    std::vector<double> out{colour[0], colour[1], colour[2]};
-    within_limits(row.key, out);
-    for (double& part : out) part = std::round(part * 1e4) / 1e4;
+    std::vector<double> out = numbers;
+    const bool by_mouse = !ImGui::GetIO().WantTextInput;
+    for (std::size_t n = 0; n < 3; ++n) {
+        if (colour[n] == before[n]) continue;
+        const double shown = number_of_text(number_text(double(colour[n]), 7));  // what a float has
+        out[n] = within_limits(row.key.limits, by_mouse ? std::round(shown * 1e4) / 1e4 : shown);
+    }
     return number_list(out, false);
 }
 
@@ -269,14 +298,12 @@ std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
     const std::vector<std::string> names = candidates(editor, row);
     ImGui::SetNextItemWidth(names.empty() ? width_before_file_button(row) : -1);
     if (names.empty()) {
-        const std::string before = shown;
         const bool is_plain = std::ranges::none_of(texts, [](const std::string& text) {
             return text.empty() || text.find(',') != text.npos || text.front() == ' ' || text.back() == ' ';
         });
         ImGui::BeginGroup();
-        input_text("##value", shown, nullptr, is_plain ? 0 : ImGuiInputTextFlags_ReadOnly);
+        const bool typed = input_value("##value", shown, is_plain ? 0 : ImGuiInputTextFlags_ReadOnly);
         if (!is_plain) tooltip_of_last("A text with a comma or blanks around it is edited in Text");
-        const bool typed = ImGui::IsItemDeactivatedAfterEdit() && shown != before;
         file_choice(editor, row, [texts, as_toml](const std::string& name) {
             std::vector<std::string> more = texts;
             if (std::ranges::find(more, name) == more.end()) more.push_back(name);

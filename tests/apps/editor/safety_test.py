@@ -198,6 +198,34 @@ class Safety(Case):
                                     "key CTRL+Z\nwait 0.1\nkey CTRL+Y\nkey CTRL+Z\nkey CTRL+Z\nwait 0.2\nkey ENTER\nkey CTRL+S\nwait 0.5\n")
             self.assertEqual(scene.read_text(encoding="utf-8"), text, edit)
 
+    def test_a_window_over_a_field_takes_no_text_away(self):
+        """F12 and F1 open windows, and what was typed counts; so do symbols beyond U+FFFF, and a seed that is none is told."""
+        scene = self.folder / "b.toml"
+        text = 'name = "models"\nseed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n'
+        for key, close in (("F12", "click Cancel"), ("F1", "key F1")):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script=f"wait-step 1\nclick scene\nwait 0.2\nclick name\nkey END\ntype \U0001f329\ue000\ua000z\nwait 0.2\n"
+                                    f"key {key}\nwait 0.5\n{close}\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+            self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("models", "models\U0001f329\ue000\ua000z"), key)
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script="wait-step 1\nclick scene\nwait 0.2\nset seed 12abc\nwait 0.3\nexpect-control refusal\n")
+
+    def test_one_number_of_several_is_changed(self):
+        """Its neighbours keep their digits and their form, and what is typed has all of its own."""
+        scene = self.folder / "c.toml"
+        text = ('seed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n[camera]\nposition_m = [12345.678, -3_217.89, 7.1125e2]\n'
+                'target_m = [0, 0, 1150]\n[georeference]\nlatitude_deg = 12\nlongitude_deg = 5\n[sun]\nelevation_deg = 40\nazimuth_deg = 200\n')
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script="wait-step 1\nclick camera\nclick \"tab Properties\"\nwait 0.3\nset camera.position_m[1] 5.123456789012\n"
+                                "wait 0.2\nclick georeference\nwait 0.2\nset georeference.latitude_deg 47.37691234\nwait 0.2\nkey CTRL+S\nwait 0.5\n")
+        typed = text.replace("-3_217.89", "5.123456789012").replace("latitude_deg = 12", "latitude_deg = 47.37691234")
+        self.assertEqual(scene.read_text(encoding="utf-8"), typed)
+        self.edit(scene, script="wait-step 1\nclick camera\nclick \"tab Properties\"\nwait 0.3\ndrag camera.position_m[0] 30 0\n"
+                                "wait 0.2\nkey CTRL+S\nwait 0.5\n")
+        saved = scene.read_text(encoding="utf-8")
+        self.assertNotEqual(saved, typed)
+        self.assertIn(", 5.123456789012, 7.1125e2]", saved)
+
     def test_a_text_with_a_comma_is_not_divided(self):
         scene = self.folder / "a.toml"
         text = 'models = "a,b.toml"\nname = "s"\n'
