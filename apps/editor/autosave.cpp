@@ -75,7 +75,8 @@ std::string scene_of(std::string_view file, const fs::path& name) {
     if (!file.starts_with(begin) || !file.ends_with(kEnd)) return {};
     file.remove_suffix(kEnd.size());
     std::string_view rest = file.substr(begin.size());
-    take_number(rest, '-');
+    while (take_number(rest, '-')) {  // a copy of a copy
+    }
     if (!rest.starts_with(extension)) return {};
     rest.remove_prefix(extension.size());
     const std::string_view scene = file.substr(1, file.size() - rest.size() - 1);

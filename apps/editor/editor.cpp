@@ -204,7 +204,7 @@ void update_title(Editor& editor, std::string& shown) {
 // Returns the exit status.
 int loop(Editor& editor, Report& report) {
     Script script = editor.options.script.empty() ? Script() : Script(editor.options.script);
-    const bool scripted = script.is_active();
+    const bool scripted = !editor.options.script.empty();
     std::string title;
     Clock::time_point last_frame = Clock::now(), last_input = Clock::now(), last_results;
     bool screenshot_due = !editor.options.screenshot.empty();
@@ -281,7 +281,11 @@ std::unique_ptr<SceneDocument> first_document(Editor& editor) {
     if (editor.options.scene.empty()) return std::make_unique<SceneDocument>(first_scene_text());
     if (!fs::is_directory(editor.options.scene)) return std::make_unique<SceneDocument>(editor.options.scene);
     for (const auto& entry : fs::directory_iterator(editor.options.scene)) {
-        if (entry.path().extension() == ".toml") editor.folder_scenes.push_back(entry.path());
+        // Not what other programs keep beside: ".#a.toml" of Emacs, "._a.toml" of macOS.
+        const bool is_hidden = entry.path().filename().string().starts_with('.');
+        std::error_code error;
+        if (entry.path().extension() == ".toml" && !is_hidden && entry.is_regular_file(error))
+            editor.folder_scenes.push_back(entry.path());
     }
     std::ranges::sort(editor.folder_scenes);
     if (editor.folder_scenes.empty()) {

@@ -175,15 +175,19 @@ void status_bar(Editor& editor) {
     const ImVec4 red(0.93f, 0.36f, 0.32f, 1);
     const bool fresh = std::chrono::steady_clock::now() - editor.message_time < std::chrono::seconds(12);
     const float rates = 26 * ImGui::GetFontSize();
+    const bool refused = fresh && editor.message_is_bad && !editor.message.empty();
     if (problems > 0) {
         ImGui::PushStyleColor(ImGuiCol_Text, red);
-        const std::string text = std::to_string(problems) + (problems == 1 ? " problem: " : " problems: ") +
-                                 editor.document->problems().front().message;
+        const std::string text = refused ? editor.message
+                                         : std::to_string(problems) +
+                                               (problems == 1 ? " problem: " : " problems: ") +
+                                               editor.document->problems().front().message;
         if (ImGui::Selectable(text.substr(0, 160).c_str(), false, 0,
                               ImVec2(std::max(1.0f, ImGui::GetContentRegionAvail().x - rates), 0))) {
             editor.wanted_tab = 2;
         }
         editor.controls.note("problems");
+        if (refused) editor.controls.note("refusal");
         ImGui::PopStyleColor();
     } else if (fresh && !editor.message.empty()) {
         if (editor.message_is_bad) ImGui::PushStyleColor(ImGuiCol_Text, red);

@@ -169,7 +169,12 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
     return Disk::reloaded;
 }
 
-void SceneDocument::reload() { take_from_disk(read_file(path_)); }
+void SceneDocument::reload() {
+    FileText now = read_file(path_);
+    const bool is_same = now.text == text();
+    take_from_disk(std::move(now));
+    if (is_same) read();  // the files that it names may be others
+}
 
 void SceneDocument::take_from_disk(FileText now) {
     saved_text_ = std::move(now.text);

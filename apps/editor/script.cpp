@@ -93,7 +93,8 @@ int key_code(const std::string& name) {
 
 Script::Script(const std::filesystem::path& path) : path_(path) {
     std::ifstream file(path);
-    if (!file) throw Error(ErrorCode::io, path.string() + ": cannot be read");
+    if (!file || std::filesystem::is_directory(path))
+        throw Error(ErrorCode::io, path.string() + ": cannot be read");
     int number = 0;
     for (std::string text; std::getline(file, text);) {
         ++number;

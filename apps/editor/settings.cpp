@@ -68,7 +68,8 @@ Settings read_settings(const std::filesystem::path& folder) {
         if (key == "theme") settings.dark = value != "light";
         if (key == "scale" && value != "0")
             take(value, kSmallestTextScale, kLargestTextScale, settings.scale);
-        if (key == "recent" && settings.recent.size() < kMostRecent) settings.recent.push_back(value);
+        if (key == "recent" && !value.empty() && settings.recent.size() < kMostRecent)
+            settings.recent.push_back(value);
     }
     return settings;
 }

@@ -326,7 +326,7 @@ std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
     if (ImGui::BeginCombo("##value", shown.empty() ? "(none)" : shown.c_str())) {
         for (const std::string& name : names) {
             bool on = std::ranges::find(texts, name) != texts.end();
-            const bool clicked = ImGui::Checkbox(name.c_str(), &on);
+            const bool clicked = ImGui::Checkbox(name.empty() ? "(no name)" : name.c_str(), &on);
             editor.controls.note("choice " + name);
             if (clicked) {
                 if (on) {

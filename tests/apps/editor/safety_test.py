@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tomllib
 import unittest
@@ -209,6 +210,54 @@ class Safety(Case):
             self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("models", "models\U0001f329\ue000\ua000z"), key)
         scene.write_text(text, encoding="utf-8")
         self.edit(scene, script="wait-step 1\nclick scene\nwait 0.2\nset seed 12abc\nwait 0.3\nexpect-control refusal\n")
+
+    def test_names_that_are_empty_are_drawn(self):
+        scene = self.models()
+        scene.write_text(MODELS.replace('"bank"', '""').replace('"few"', '""'), encoding="utf-8")
+        settings = self.folder / "config/nephos"
+        settings.mkdir(parents=True)
+        (settings / "editor.conf").write_text("recent = \n", encoding="utf-8")
+        self.edit(scene, script="""
+            wait 1
+            click sky
+            click sky[0]
+            click "tab Properties"
+            wait 0.3
+            click sky[0].models
+            wait 0.3
+            """)
+        self.edit(scene, script="""
+            wait 1
+            click layer
+            click layer[0]
+            click "tab Properties"
+            wait 0.3
+            click layer[0].skies
+            wait 0.3
+            """)
+        self.edit(scene, script="wait 1\nclick \"menu File\"\nwait 0.3\nclick \"menu Recent\"\nwait 0.3\n")
+
+    def test_reload_reads_the_files_that_a_scene_names(self):
+        scene = self.folder / "r.toml"
+        scene.write_text(MODELS[:MODELS.index("[[model]]")] + 'models = "m.toml"\n' + MODELS[MODELS.index("[[sky]]"):], encoding="utf-8")
+        self.edit(scene, script="wait 1\nexpect-control problems\n")
+        later = threading.Timer(5, lambda: (self.folder / "m.toml").write_text(
+            "seed = 1\n" + MODELS[MODELS.index("[[model]]"):MODELS.index("[[sky]]")], encoding="utf-8"))
+        later.start()
+        self.edit(scene, script="wait 7\nexpect-control problems\nclick \"menu File\"\nclick \"menu Reload\"\nwait-step 1\n")
+
+    def test_scripts_without_commands_end(self):
+        scene = self.models()
+        self.edit(scene, script="# nothing\n", timeout=120)
+        self.assertIn("cannot be read", self.edit(scene, "--script", self.folder, status=3, timeout=120))
+
+    def test_a_folder_of_scenes_and_other_things(self):
+        folder = self.folder / "scenes"
+        (folder / "a.toml").mkdir(parents=True)
+        os.symlink("me@host.1:2", folder / ".#sky.toml")
+        (folder / "._sky.toml").write_bytes(b"\0\5\26\7")
+        (folder / "sky.toml").write_text(MODELS, encoding="utf-8")
+        self.edit(folder, script="wait-step 1\nexpect-control model\n")
 
     def test_one_number_of_several_is_changed(self):
         """Its neighbours keep their digits and their form, and what is typed has all of its own."""
