@@ -33,8 +33,8 @@ bool is_trusted_link(const std::filesystem::path& link) {
     return ::lstat(link.c_str(), &status) == 0 && (status.st_uid == ::geteuid() || status.st_uid == 0);
 }
 
-// Gives a new file the access control list of the one that it replaces, or takes away that of its folder's default. Returns false where
-// that was not possible.
+// Gives a new file the access control list of the one that it replaces, or takes away that of its folder's default.
+// Returns false where that was not possible.
 bool take_access_list(int folder, const std::string& name, int to) {
     constexpr const char* kAttribute = "system.posix_acl_access";
     const std::string from = "/proc/self/fd/" + std::to_string(folder) + "/" + name;
@@ -153,9 +153,9 @@ void AtomicFile::open_folder(const std::filesystem::path& folder) {
     if (folder_ < 0) fail(path_, "cannot create", errno);
 }
 
-// Takes over owner, group, permissions and access control list of the file that is replaced, before there is content that others might read. What
-// another user put there says nothing, but for root in a folder that nobody else may write to. Throws Error(io) where the new
-// file would be open to more.
+// Takes over owner, group, permissions and access control list of the file that is replaced, before there is content
+// that others might read. What another user put there says nothing, but for root in a folder that nobody else may write
+// to. Throws Error(io) where the new file would be open to more.
 void AtomicFile::take_permissions(int fd) {
     struct stat before {
     }, parent{}, now{};

@@ -6,8 +6,8 @@
 
 namespace nephos {
 
-// Returns whether the grid of the wind in a VDB file may have this name: some programs take names for paths, and look grids up by them,
-// so no other grid has it.
+// Returns whether the grid of the wind in a VDB file may have this name: some programs take names for paths, and look
+// grids up by them, so no other grid has it.
 constexpr bool is_name_of_wind(std::string_view name) {
     const auto is_allowed = [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';

@@ -281,7 +281,7 @@ std::unique_ptr<SceneDocument> first_document(Editor& editor) {
     if (editor.options.scene.empty()) return std::make_unique<SceneDocument>(first_scene_text());
     if (!fs::is_directory(editor.options.scene)) return std::make_unique<SceneDocument>(editor.options.scene);
     for (const auto& entry : fs::directory_iterator(editor.options.scene)) {
-        // Not what other programs keep beside: ".#a.toml" of Emacs, "._a.toml" of macOS.
+        // Not what other programs keep beside: locks of Emacs, attributes of macOS.
         const bool is_hidden = entry.path().filename().string().starts_with('.');
         std::error_code error;
         if (entry.path().extension() == ".toml" && !is_hidden && entry.is_regular_file(error))

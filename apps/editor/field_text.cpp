@@ -16,8 +16,8 @@
 namespace nephos {
 namespace {
 
-// ImGui takes no private characters of the keyboard: those of the field are of scripts that its font does not have (Yi, Vai, Bamum
-// and their neighbours).
+// ImGui takes no private characters of the keyboard: those of the field are of scripts that its font does not have (Yi,
+// Vai, Bamum and their neighbours).
 constexpr unsigned kFirstOfTable = 0xA000, kLastOfTable = 0xABFF, kFirstPrivate = 0xE000,
                    kLastPrivate = 0xF8FF;
 constexpr unsigned kLastOfField = 0xFFFF;
@@ -324,7 +324,8 @@ bool input_value(const char* label, std::string& text, ImGuiInputTextFlags flags
     const bool was_active = ImGui::GetActiveID() == id;
     input_text(label, shown, nullptr, flags);
     if (ImGui::GetActiveID() == id) return false;
-    // A window that opens takes the caret away between two frames, and ImGui then forgets what was typed. Escape does so in the field.
+    // A window that opens takes the caret away between two frames, and ImGui then forgets what was typed. Escape does so
+    // in the field.
     if (!was_active && before.id == id && before.given == field && before.taken != field)
         shown = text_of_field(before.taken);
     if (shown == text) return false;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Text in the fields of Dear ImGui, for any text. Its packaged library has characters of 16 bits and lines that end with "\n":
-// a character beyond U+FFFF (a symbol of weather, say) would be replaced for good by U+FFFD, and what is typed at the end of a
-// line with "\r\n" would stand behind the "\r". In fields, characters from U+A000 to U+ABFF stand for those beyond, for private
-// ones (U+E000 to U+F8FF), which it takes of no keyboard, and for those of this range. There is one table of them, so that texts can
-// be copied between fields; all functions are for the thread that draws.
+// Text in the fields of Dear ImGui, for any text. Its packaged library has characters of 16 bits and lines that end with
+// "\n": a character beyond U+FFFF (a symbol of weather, say) would be replaced for good by U+FFFD, and what is typed at
+// the end of a line with "\r\n" would stand behind the "\r". In fields, characters from U+A000 to U+ABFF stand for those
+// beyond, for private ones (U+E000 to U+F8FF), which it takes of no keyboard, and for those of this range. There is one
+// table of them, so that texts can be copied between fields; all functions are for the thread that draws.
 
 #include <string>
 #include <string_view>
@@ -28,8 +28,9 @@ unsigned field_character(unsigned code);
 bool input_text(const char* label, std::string& text, const char* hint = nullptr,
                 ImGuiInputTextFlags flags = 0);
 
-// Shows a value in a field of one line. Returns true in the frame after the field was left with another text, by Enter, Tab, a click or a
-// window that opens over it; only then `text` is changed, to what was typed. Escape brings back what was there.
+// Shows a value in a field of one line. Returns true in the frame after the field was left with another text, by Enter,
+// Tab, a click or a window that opens over it; only then `text` is changed, to what was typed. Escape brings back what
+// was there.
 bool input_value(const char* label, std::string& text, ImGuiInputTextFlags flags = 0);
 
 // As ImGui::InputTextMultiline(), but returns whether the text was changed. Lines keep their ends; what is added has those of

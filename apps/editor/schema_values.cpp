@@ -256,8 +256,8 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
 
 namespace {
 
-// Adds the paths of texts that are `name` at places such as "sky.*.models", where "*" stands for all elements of an array; of an array of
-// texts at the end, those of its elements.
+// Adds the paths of texts that are `name` at places such as "sky.*.models", where "*" stands for all elements of an
+// array; of an array of texts at the end, those of its elements.
 void add_users(const Node& node, std::string_view places, const std::string& name, const TextPath& path,
                std::vector<TextPath>& users) {
     const auto below = [&path](TextStep step) {

@@ -52,8 +52,8 @@ std::string unused_name(std::string_view start, const std::vector<std::string>& 
 // Returns the texts under `name` of all elements of an array.
 std::vector<std::string> names_of(const Node* array);
 
-// Gives an element another name, and changes what refers to it: skies, rain areas and metamorphoses to models, layers to skies. Throws
-// Error(usage) where another element of the array has that name.
+// Gives an element another name, and changes what refers to it: skies, rain areas and metamorphoses to models, layers to
+// skies. Throws Error(usage) where another element of the array has that name.
 std::string with_new_name(std::string text, const Node& values, const TextPath& path,
                           const std::string& name);
 

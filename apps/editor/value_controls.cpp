@@ -49,8 +49,8 @@ std::string number_list(const std::vector<double>& numbers, bool integers) {
     return numbers.size() > 1 ? out + "]" : out;
 }
 
-// Returns as many digits as the number has, at least six: a field that is typed into begins with what it shows, and a drag is rounded
-// to as many.
+// Returns as many digits as the number has, at least six: a field that is typed into begins with what it shows, and a
+// drag is rounded to as many.
 std::string number_format(double number) {
     int digits = 6;
     while (digits < 17 && std::isfinite(number) && number_of_text(number_text(number, digits)) != number)

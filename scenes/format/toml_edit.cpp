@@ -234,7 +234,8 @@ std::vector<Change> replaced_value(std::string_view text, const TomlNode& node, 
     return changes;
 }
 
-// Returns the text with some items of an array more or less, and all else in it as it was, comments too; nothing where others changed.
+// Returns the text with some items of an array more or less, and all else in it as it was, comments too; nothing where
+// others changed.
 std::optional<std::string> with_items(std::string_view text, const TextPath& path, const TomlNode& node,
                                       std::string_view value) {
     if (node.form != Form::array || !value.starts_with('[')) return std::nullopt;
