@@ -3,10 +3,10 @@
 //
 //     FAIL_CALL="NAME HOW FIRST COUNT"  of the calls NAME, numbered from 1 among those that FAIL_PATH allows, COUNT fail
 //                                       from FIRST on. NAME: open, read, write (with pwrite, writev), lseek, fsync (with
-//                                       fdatasync), rename, mkdir, stat (with lstat, fstat), mmap, or allocate (memory of
-//                                       32 KiB or more). HOW: an error (EIO, EINTR, ENOSPC, EACCES, EMFILE, ENOMEM), KILL,
-//                                       SHORT (of read and write: half of the bytes), or COUNT (a byte into the file
-//                                       FAIL_COUNT for each)
+//                                       fdatasync), rename (with renameat), mkdir, stat (with lstat, fstat, fstatat), mmap, or
+//                                       allocate (memory of 32 KiB or more). HOW: an error (EIO, EINTR, ENOSPC, EACCES,
+//                                       EMFILE, ENOMEM), KILL, STOP (until SIGCONT; the call does not fail), SHORT (of read
+//                                       and write: half of the bytes), or COUNT (a byte into the file FAIL_COUNT for each)
 //     FAIL_PATH=TEXT                    only on files in whose path TEXT occurs
 //     FAIL_PROGRAM=NAME                 only in this program
 
@@ -89,6 +89,10 @@ bool fails(const char* name, std::string_view path, bool* shorten = nullptr) {
     const long number = ++calls;
     if (number < p.first || number >= p.first + p.count) return false;
     if (is("KILL")) ::raise(SIGKILL);
+    if (is("STOP")) {
+        ::raise(SIGSTOP);
+        return false;
+    }
     if (is("SHORT")) {
         if (shorten != nullptr) *shorten = true;
         return false;
@@ -237,6 +241,10 @@ ssize_t writev(int fd, const struct iovec* parts, int count) {
 int rename(const char* from, const char* to) noexcept {
     return fails_at("rename", AT_FDCWD, to) ? -1 : next(&rename, "rename")(from, to);
 }
+int renameat(int from_folder, const char* from, int to_folder, const char* to) noexcept {
+    return fails_at("rename", to_folder, to) ? -1
+                                             : next(&renameat, "renameat")(from_folder, from, to_folder, to);
+}
 int mkdir(const char* path, mode_t mode) noexcept {
     return fails_at("mkdir", AT_FDCWD, path) ? -1 : next(&mkdir, "mkdir")(path, mode);
 }
@@ -245,6 +253,9 @@ int stat(const char* path, struct stat* status) noexcept {
 }
 int lstat(const char* path, struct stat* status) noexcept {
     return fails("stat", std::string_view(path)) ? -1 : next(&lstat, "lstat")(path, status);
+}
+int fstatat(int folder, const char* path, struct stat* status, int flags) noexcept {
+    return fails_at("stat", folder, path) ? -1 : next(&fstatat, "fstatat")(folder, path, status, flags);
 }
 int fstat(int fd, struct stat* status) noexcept {
     return fails("stat", fd) ? -1 : next(&fstat, "fstat")(fd, status);
