@@ -2,15 +2,13 @@
 #include "study/fit_folder.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 
 #include "study/folder_contents.h"
+#include "study/folder_guard.h"
 #include "study/placed_scene.h"
 #include "study/plan_memory.h"
 #include "study/tables.h"
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -28,14 +26,6 @@ namespace {
 constexpr double kFewSamples = 200;
 
 struct Stopped {};
-
-// Opens the folder for its identity alone: the records of earlier waves are in it.
-Descriptor folder_of_fit(const std::filesystem::path& folder) {
-    Descriptor held(::open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
-    if (held.get() < 0)
-        throw Error(ErrorCode::io, folder.string() + ": cannot open the folder: " + std::strerror(errno));
-    return held;
-}
 
 std::string name_of(const FitParameter& parameter) {
     return fmt::format("{}", fmt::join(parameter.keys, "+"));
@@ -180,10 +170,8 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
                        int(std::min<std::uint64_t>(std::uint64_t(job.workers), options.problem.runs)));
     const std::string& simulation_hash = plan_of_ends.simulation_hash();
     Descriptor held;
-    const auto require_in_place = [&] {
-        if (!is_same_file(held.get(), job.folder))
-            throw Error(ErrorCode::io,
-                        job.folder.string() + ": was removed or replaced while the fit was at work");
+    const std::function<void()> check_place = [&] {
+        require_in_place(held, job.folder, "the fit was at work");
     };
     std::vector<std::string> problems;
     const Simulate simulate = [&](int wave, const std::vector<std::vector<double>>& points) {
@@ -195,9 +183,9 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
                             "command fits with what is in it now");
         if (held.get() < 0) {
             create_folders(job.folder);
-            held = folder_of_fit(job.folder);
+            held = identity_of_folder(job.folder);
         }
-        require_in_place();
+        check_place();
         SweepJob part = job;
         part.folder = job.folder / (wave == 4 ? "proof" : fmt::format("wave-{}", wave));
         const SweepReport report = run_sweep(
@@ -211,13 +199,20 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
     try {
         FitResult result = fit(options.problem, simulate);
         result.problems = std::move(problems);
-        const std::function<void()> check = require_in_place;
-        const PublishCheck keeps_in_place(check);
+        const PublishCheck keeps_in_place(check_place);
         write_results(options, result, job.folder);
         return result;
     } catch (const Stopped&) {
         return std::nullopt;
     }
+}
+
+std::string failed_runs_text(const FitResult& result) {
+    return fmt::format(
+        "{} runs failed: failures.csv of each wave has them with the command that repeats each, "
+        "--retry-failed "
+        "runs them again",
+        result.failed);
 }
 
 std::string fit_text(const FitOptions& options, const FitResult& result) {
@@ -273,11 +268,7 @@ std::string fit_text(const FitOptions& options, const FitResult& result) {
         text +=
             fmt::format("warning: {} of {} runs: no more points were found where the targets are possible\n",
                         result.runs, options.problem.runs);
-    if (result.failed > 0)
-        text += fmt::format(
-            "warning: {} runs failed: failures.csv of each wave has them with the command that repeats each, "
-            "--retry-failed runs them again\n",
-            result.failed);
+    if (result.failed > 0) text += "warning: " + failed_runs_text(result) + '\n';
     if (result.lost > 0)
         text +=
             fmt::format("warning: {} of {} runs had no mean (not steady, dead or failed) and told nothing\n",

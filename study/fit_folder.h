@@ -22,6 +22,9 @@ std::optional<FitResult> run_fit(const FitOptions& options, const SweepJob& job,
                                  const std::function<void(int wave, const SweepProgress&)>& progress,
                                  const std::function<bool()>& stop);
 
+// Returns how many runs failed, and where they are.
+std::string failed_runs_text(const FitResult& result);
+
 // Returns the result as text: a table of parameters, one of targets, and what the targets leave free.
 std::string fit_text(const FitOptions& options, const FitResult& result);
 

@@ -2,10 +2,12 @@
 #include "study/folder_guard.h"
 
 #include <cerrno>
+#include <cstring>
 #include <ctime>
 
 #include "study/shard_files.h"
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -43,6 +45,18 @@ void FolderGuard::require_no_writer() const {
                             ": a sweep of another plan is writing into this folder: wait for its "
                             "end, or choose another --out");
     }
+}
+
+Descriptor identity_of_folder(const std::filesystem::path& folder) {
+    Descriptor held(::open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    if (held.get() < 0)
+        throw Error(ErrorCode::io, folder.string() + ": cannot open the folder: " + std::strerror(errno));
+    return held;
+}
+
+void require_in_place(const Descriptor& held, const std::filesystem::path& folder, std::string_view work) {
+    if (is_same_file(held.get(), folder)) return;
+    throw Error(ErrorCode::io, fmt::format("{}: was removed or replaced while {}", folder.string(), work));
 }
 
 }  // namespace nephos

@@ -3,6 +3,9 @@
 
 #include <filesystem>
 #include <functional>
+#include <string_view>
+
+#include "core/descriptor.h"
 
 namespace nephos {
 
@@ -26,5 +29,11 @@ class FolderGuard {
     int file_ = -1;  // descriptor of the file that is locked
     bool is_held_ = false;
 };
+
+// Opens a folder for its identity alone, by which it is known again when its path leads elsewhere. Throws Error(io).
+Descriptor identity_of_folder(const std::filesystem::path& folder);
+
+// Throws Error(io) where the path leads no longer to the folder that is held: "... was removed or replaced while WORK".
+void require_in_place(const Descriptor& held, const std::filesystem::path& folder, std::string_view work);
 
 }  // namespace nephos

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "study/folder_contents.h"
+#include "study/folder_guard.h"
 #include "study/netcdf_file.h"
 #include "study/placed_scene.h"
 #include "study/student.h"
@@ -17,6 +18,7 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "core/random.h"
 #include "scenes/format/writer.h"
 #include "simulation/layer_simulation.h"
@@ -480,6 +482,10 @@ LostRuns runs_lost(const SweepPlan& plan, const Records& records, const std::fil
 
 std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
                            const std::filesystem::path& folder) {
+    create_folders(folder);
+    const Descriptor held = identity_of_folder(folder);
+    const std::function<void()> check = [&] { require_in_place(held, folder, "its tables were written"); };
+    const PublishCheck keeps_in_place(check);
     // First, for damaged series alone can end it: the tables before it then stay as they are.
     write_series(plan, records, folder / "series.nc");
     write_runs(plan, records, folder / "runs.csv");

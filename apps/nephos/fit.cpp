@@ -59,7 +59,10 @@ int fit(const FitArguments& a) {
     const int status = !result->problems.empty() ? int(ErrorCode::io)
                        : result->failed > 0      ? int(ErrorCode::check)
                                                  : 0;
-    if (a.work.quiet) return status;
+    if (a.work.quiet) {
+        if (result->failed > 0) print_note(failed_runs_text(*result));
+        return status;
+    }
     Output output;
     output.write(fit_text(options, *result));
     const std::string folder = job.folder.string();

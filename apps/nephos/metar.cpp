@@ -111,6 +111,14 @@ void require_content(const Metar& report) {
             report.text + "\n  " + std::string(report.text.size(), ' ') + "^");
 }
 
+// Throws as it would without --explain where the date or the name fit no scene.
+void check_options(const MetarArguments& a, const std::optional<Taf>& taf, const Metar& report) {
+    const auto whole = [](std::size_t layers) { return std::vector<double>(layers, 1.0); };
+    const std::string text = taf ? taf_scene_text(*taf, a.options, whole(layers_of(*taf).size()))
+                                 : metar_scene_text(report, a.options, whole(layers_of(report).size()));
+    read_scene_text(text, "the scene of the report");
+}
+
 int metar(const MetarArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     const std::string text = report_of(a.report);
@@ -131,6 +139,7 @@ int metar(const MetarArguments& a) {
         throw Error(error.code(), a.report.substr(1) + ": " + error.what());
     }
     if (a.explain) {
+        check_options(a, taf, report);
         taf ? explain(a, *taf) : explain(a, report);
         return 0;
     }

@@ -36,8 +36,11 @@ std::size_t chosen_layer(const StateArguments& a, const std::vector<LayerSimulat
     for (std::size_t n = 0; n < layers.size(); ++n) {
         if (layers[n].automaton() == nullptr) continue;
         if (layers[n].name() == a.layer || (a.layer.empty() && layers.size() == 1)) return n;
-        names.push_back(layers[n].name());
+        if (!layers[n].name().empty()) names.push_back(layers[n].name());
     }
+    if (names.empty() && !a.layer.empty())
+        throw Error(ErrorCode::usage,
+                    a.scene.file + ": has no layers with an automaton: leave out --layer '" + a.layer + "'");
     const std::string_view meant = closest_word(a.layer, names);
     throw Error(ErrorCode::usage,
                 a.layer.empty() ? fmt::format("{}: has several layers: give --layer, one of {}", a.scene.file,

@@ -384,12 +384,14 @@ void add_sweep_command(CLI::App& app, Action& action) {
     add_value(*command, "--shard", "I/N",
               "Only the I-th of N parts of the runs, I from 0; `nephos merge` makes the tables",
               [a](const std::string& text) { parse_shard(text, *a); });
-    add_value(*command, "--emit", "ENGINE",
-              "Run nothing, write what slurm, snakemake or parallel needs to run the sweep on many machines",
-              [a](const std::string& text) { a->emit = parse_engine(text); });
+    CLI::Option* emit = add_value(
+        *command, "--emit", "ENGINE",
+        "Run nothing, write what slurm, snakemake or parallel needs to run the sweep on many machines",
+        [a](const std::string& text) { a->emit = parse_engine(text); });
     add_value(*command, "--tasks", "N",
               "With --emit: parts of the sweep, each a task of the engine (default: 16)",
-              [a](const std::string& text) { a->tasks = std::uint32_t(parse_unsigned(text, 1, 100'000)); });
+              [a](const std::string& text) { a->tasks = std::uint32_t(parse_unsigned(text, 1, 100'000)); })
+        ->needs(emit);
     command->add_flag("--dry-run", a->dry_run, "Only check all values, and print what would be run");
     command->add_flag("--status", a->status, "Only print how many runs are done");
     command->add_flag("--retry-failed", a->retry_failed, "Run again what failed");

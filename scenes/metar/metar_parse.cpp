@@ -375,6 +375,8 @@ class Reader {
             take("not observed", false);
             return true;
         }
+        if (seen_temperature_) fail("the report has a temperature already");
+        seen_temperature_ = true;
         metar_.temperature_c = temperature;
         metar_.dew_point_c = dew;
         take(temperature ? "temperature and dew point" : "temperature unknown", temperature.has_value());
@@ -463,7 +465,7 @@ class Reader {
     Metar metar_;
     std::vector<Word> words_;
     std::size_t at_ = 0;
-    bool lenient_, seen_wind_ = false;
+    bool lenient_, seen_wind_ = false, seen_temperature_ = false;
 };
 
 }  // namespace

@@ -368,9 +368,9 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
         }
         for (const auto& layer : layers) sequences.push_back(sequence_of_run(options, run, layer));
     } else {
+        sequences.push_back(sequence_of_files(options));
         if (options.layer && options.layer != "all")
             throw Error(ErrorCode::usage, "--layer: layers are those of a run, not of a file");
-        sequences.push_back(sequence_of_files(options));
     }
     for (ExportSequence& s : sequences) {
         choose_layout(options, s, notes);

@@ -2,6 +2,7 @@
 """Sweeps and fits from Python: the `nephos` command does them, in processes of its own, so that tables have the same bytes
 however they were asked for."""
 
+import collections.abc
 import contextlib
 import csv
 import json
@@ -185,6 +186,8 @@ def _pair(name, values, expected):
 
 def _plan(axes, options):
     """Returns the lines of a plan, and the keys of the axis that stands in a line of it, by its number from 1."""
+    if not isinstance(axes, collections.abc.Mapping):
+        raise _error(f"axes is a {type(axes).__name__}; expected a dict of keys and their values", "usage")
     places = {}
     lines = [f"{key} = {_toml_text(value)}" for key, value in options.items() if value is not None]
     for key, values in axes.items():

@@ -223,6 +223,7 @@ class Export(Case):
         self.call("verify", "out")
         self.refused(2, "export", "run", "--to", "raw", "--type", "r8", "-o", "out", says="other options")
         self.refused(2, "export", "run", "--to", "raw", "-o", "run", says="not empty")
+        self.refused(3, "export", "nowhere", "--to", "raw", "--layer", "low", "-o", "out", says="nowhere: ")
 
     def test_a_second_export_leaves_what_was_asked_for_last(self):
         """Frames that it does not make are of the first, and in no list: they go, but for what somebody changed."""

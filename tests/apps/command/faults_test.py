@@ -242,6 +242,22 @@ class Faults(Case):
         self.ends_with(process, "renamed: the folder was removed or renamed")
         self.assertFalse((self.folder / "renamed/manifest.json").exists())
 
+    def test_tables_of_a_folder_that_is_renamed_between_them_are_not_spread(self):
+        """A merge that is stopped where it publishes its second table, while its folder gets another name."""
+        self.call("sweep", self.scene, "--axis", "field.background.ext=0.05,0.1", "--replicates", "1", "--steps", "20", "--out", "sweep")
+        merge = subprocess.Popen([NEPHOS, "merge", "sweep"], cwd=self.folder, stderr=subprocess.PIPE, text=True,
+                                 env=self.failing("rename STOP 1 1", "runs.csv"))
+        self.addCleanup(merge.stderr.close)
+        self.addCleanup(merge.wait)
+        self.addCleanup(merge.kill)
+        self.assertTrue(os.WIFSTOPPED(os.waitpid(merge.pid, os.WUNTRACED)[1]))
+        (self.folder / "sweep").rename(self.folder / "moved")
+        merge.send_signal(signal.SIGCONT)
+        self.assertEqual(merge.wait(timeout=60), 3)
+        self.assertIn("sweep: was removed or replaced while its tables were written", merge.stderr.read())
+        self.assertFalse((self.folder / "sweep").exists())
+        self.no_leftovers("moved")
+
     def test_rows_are_not_appended_to_what_a_link_leads_to(self):
         process = self.started("out")
         process.send_signal(signal.SIGINT)

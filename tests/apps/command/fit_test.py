@@ -96,7 +96,8 @@ class Fit(Case):
         self.call("fit", file, "--out", "whole", "-j", "2")
         for _ in range(10):  # one that has just ended its last run tells all
             process = subprocess.Popen([NEPHOS, "fit", file, "--out", "out", "-j", "1", "-q", "--overwrite"], cwd=self.folder,
-                                       env=self.environment)
+                                       env=self.environment, stderr=subprocess.PIPE, text=True)
+            self.addCleanup(process.stderr.close)
             children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
             with contextlib.suppress(FileNotFoundError, ProcessLookupError):
                 while process.poll() is None:
@@ -106,6 +107,7 @@ class Fit(Case):
                         break
             status = process.wait(timeout=120)
             self.assertIn(status, (0, 1, 2))  # 2: too few are left
+            self.assertEqual("failed" in process.stderr.read(), status != 0)
             if status != 0:
                 break
         else:

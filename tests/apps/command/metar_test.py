@@ -92,7 +92,7 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
 
     def test_mistakes_have_a_caret(self):
         for report, word in (("EGLL 211350Z 24012KT 9999 FEWO20 14/08 Q1017", "FEWO20"), ("EGLL 321350Z 24012KT 9999", "321350Z"),
-                             ("EGLL 211350Z 24012KT 28012KT 9999", "28012KT"), ("EGLL 211350Z NIL", "NIL"), ("EGLLX 211350Z", "EGLLX"),
+                             ("EGLL 211350Z 24012KT 28012KT 9999", "28012KT"), ("EGLL 211350Z 24012KT 9999 14/08 13/M01", "13/M01"), ("EGLL 211350Z NIL", "NIL"), ("EGLLX 211350Z", "EGLLX"),
                              ("EGLL 211350Z 37012KT 9999", "37012KT"), ("EGLL 211350Z 24012KT 200V370 9999", "200V370"),
                              ("KJFK 211350Z 24012KT 9999999SM", "9999999SM"), ("KJFK 211350Z 24012KT 1/99999999999SM", "1/99999999999SM"),
                              ("KJFK 211350Z 24012G99999999999KT 9999", "24012G99999999999KT"),
@@ -116,7 +116,9 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
         self.assertIn("report.txt: `" + "X" * 60 + "...`: expected", said)
         self.assertLess(len(said), 300)
         self.assertIn("left out", self.call("metar", "EGLL 211350Z 24012KT 9999 FEWO20", "--lenient", "--explain").stderr)
-        self.assertIn("does not fit", self.call("metar", REAL[0], "--date", "2024-06-22", status=2).stderr)
+        for explain in ((), ("--explain",)):
+            self.assertIn("does not fit", self.call("metar", REAL[0], "--date", "2024-06-22", *explain, status=2).stderr)
+            self.assertIn('"a/b", which makes no file names', self.call("metar", REAL[0], "--name", "a/b", *explain, status=2).stderr)
 
     def test_storms_of_100_knots(self):
         """P99KT stands for all that is stronger."""

@@ -452,7 +452,8 @@ sd = 0.01
                 nephos.sweep(scene, axes, out=self.folder / "bad", **options)
             self.assertNotIn(tempfile.gettempdir() + "/nephos-", str(caught.exception))
             self.assertIsNone(caught.exception.file)
-        for axes, options, says in (({"field.background.ext": "0.1"}, {}, "is one text; expected a list of values"),
+        for axes, options, says in (([("field.background.ext", [0.1])], {}, "axes is a list; expected a dict"),
+                                    ({"field.background.ext": "0.1"}, {}, "is one text; expected a list of values"),
                                     ({"field.background.ext": [0.1]}, {"steps": (20,)}, r"steps is \(20,\); expected \(least, most\)"),
                                     ({"field.background.ext": [0.1]}, {"shard": (0,)}, r"shard is \(0,\); expected \(i, n\)"),
                                     ({"field.background.ext": ["\udc80"]}, {}, "is no text of Unicode")):
