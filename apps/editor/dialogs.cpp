@@ -297,7 +297,7 @@ void do_pending(Editor& editor) {
         editor.question = {
             "A run into files is under way: out/" + editor.run->folder.filename().string() + ".",
             "Stop it and quit", [&editor] {
-                editor.run.reset();  // after the step that it is at; `nephos run --resume` goes on
+                editor.run.reset();  // after the step that it is at; `nephos run --resume --out` goes on
                 editor.pending = Pending::close;
                 do_pending(editor);
             }};

@@ -192,7 +192,8 @@ void draw_interface(Editor& editor) {
     menu_bar(editor);
     layout(editor, scale);
     dialogs(editor);
-    if (!ImGui::IsAnyMouseDown()) editor.document->end_merging();
+    // What is dragged, or typed into one field, is one step.
+    if (!ImGui::IsAnyMouseDown() && !ImGui::IsAnyItemActive()) editor.document->end_merging();
 }
 
 void update_title(Editor& editor, std::string& shown) {

@@ -330,7 +330,7 @@ void text_panel(Editor& editor) {
     if (input_lines("##text", editor.text_buffer,
                     ImVec2(-1, ImGui::GetContentRegionAvail().y - below - (count > 0 ? 6 : 0)),
                     ImGuiInputTextFlags_AllowTabInput)) {
-        attempt(editor, [&] { editor.document->edit(editor.text_buffer, "Type", "text"); });
+        attempt(editor, [&] { editor.document->edit(editor.text_buffer, "Type"); });
         editor.text_version = editor.document->version();
     }
     editor.controls.note("text");

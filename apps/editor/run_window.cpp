@@ -6,6 +6,7 @@
 #include <imgui.h>
 
 #include "apps/editor/state.h"
+#include "core/text.h"
 #include "simulation/run_folder.h"
 
 namespace nephos {
@@ -38,7 +39,8 @@ void start_run(Editor& editor) {
             const RunReport report = run_scene(std::move(settings), observer);
             result = report.complete ? "complete: " + std::to_string(report.frames) + " frames in " +
                                            report.folder.string()
-                                     : "stopped; `nephos run --resume` goes on";
+                                     : "stopped; `nephos run --resume --out " +
+                                           shell_word(report.folder.string()) + "` goes on";
         } catch (const std::exception& error) {
             failure = error.what();
         }

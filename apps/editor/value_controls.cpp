@@ -120,6 +120,23 @@ bool drag_numbers(Editor& editor, const ValueRow& row, std::vector<double>& numb
     return changed;
 }
 
+// A patch of the colour, which opens a picker. Components that it changed have no more digits than a float, four behind the
+// point where the mouse chose them.
+bool colour_patch(std::vector<double>& numbers) {
+    const float before[3] = {float(numbers[0]), float(numbers[1]), float(numbers[2])};
+    float colour[3] = {before[0], before[1], before[2]};
+    constexpr ImGuiColorEditFlags kPatch =
+        ImGuiColorEditFlags_NoInputs | ImGuiColorEditFlags_Float | ImGuiColorEditFlags_HDR;
+    if (!ImGui::ColorEdit3("##colour", colour, kPatch)) return false;
+    const bool by_mouse = !ImGui::GetIO().WantTextInput;
+    for (std::size_t n = 0; n < 3; ++n) {
+        if (colour[n] == before[n]) continue;
+        const double shown = number_of_text(number_text(double(colour[n]), 7));
+        numbers[n] = by_mouse ? std::round(shown * 1e4) / 1e4 : shown;
+    }
+    return true;
+}
+
 // Numbers side by side. Returns the new value as TOML.
 std::optional<std::string> edit_numbers(Editor& editor, const ValueRow& row, std::size_t count,
                                         bool integers) {
@@ -141,16 +158,22 @@ std::optional<std::string> edit_numbers(Editor& editor, const ValueRow& row, std
             return number_text(numbers[0]);
         }
     }
+    bool picked = false;
     ImGui::SetNextItemWidth(-1);
     if (count == 1 && is_slider(row.key)) {
         const double low = row.key.limits.min, high = row.key.limits.max;
         changed |= ImGui::SliderScalar("##value", ImGuiDataType_Double, numbers.data(), &low, &high,
                                        format_of(row.key, numbers[0], integers).c_str());
     } else {
+        if (row.key.kind == KeyKind::colour) {
+            picked = colour_patch(numbers);
+            editor.controls.note(path_text(row.path) + " colour");
+            ImGui::SameLine();
+        }
         changed |= drag_numbers(editor, row, numbers, integers);
     }
-    if (!changed) return std::nullopt;
-    const bool by_mouse = !ImGui::GetIO().WantTextInput;
+    if (!changed && !picked) return std::nullopt;
+    const bool by_mouse = !ImGui::GetIO().WantTextInput && !picked;
     for (std::size_t n = 0; n < count; ++n) {
         if (numbers[n] == before[n]) continue;  // one of several stays as it is, with all its digits
         if (by_mouse && !integers) numbers[n] = rounded(numbers[n], drag_speed(row.key, numbers[n], false));
@@ -244,23 +267,6 @@ std::optional<std::string> edit_boundaries(const ValueRow& row) {
     }
     if (!changed) return std::nullopt;
     return "[\"" + words[0] + "\", \"" + words[1] + "\", \"" + words[2] + "\"]";
-}
-
-std::optional<std::string> edit_colour(const ValueRow& row) {
-    const std::vector<double> numbers = numbers_of(row.node, 3);
-    const float before[3] = {float(numbers[0]), float(numbers[1]), float(numbers[2])};
-    float colour[3] = {before[0], before[1], before[2]};
-    ImGui::SetNextItemWidth(-1);
-    if (!ImGui::ColorEdit3("##value", colour, ImGuiColorEditFlags_Float | ImGuiColorEditFlags_HDR))
-        return std::nullopt;
-    std::vector<double> out = numbers;
-    const bool by_mouse = !ImGui::GetIO().WantTextInput;
-    for (std::size_t n = 0; n < 3; ++n) {
-        if (colour[n] == before[n]) continue;
-        const double shown = number_of_text(number_text(double(colour[n]), 7));  // what a float has
-        out[n] = within_limits(row.key.limits, by_mouse ? std::round(shown * 1e4) / 1e4 : shown);
-    }
-    return number_list(out, false);
 }
 
 // Names that a list of texts may hold: those of models or skies.
@@ -365,7 +371,7 @@ std::optional<std::string> edit_value(Editor& editor, const ValueRow& row) {
         case KeyKind::counts:
             return edit_numbers(editor, row, 2, true);
         case KeyKind::colour:
-            return edit_colour(row);
+            return edit_numbers(editor, row, 3, false);
         case KeyKind::word:
             return edit_word(editor, row);
         case KeyKind::boundaries:

@@ -211,6 +211,23 @@ class Safety(Case):
         scene.write_text(text, encoding="utf-8")
         self.edit(scene, script="wait-step 1\nclick scene\nwait 0.2\nset seed 12abc\nwait 0.3\nexpect-control refusal\n")
 
+    def test_what_is_typed_into_a_number_is_one_step_of_undo(self):
+        """However slowly; and Escape gives a colour back with all of its digits."""
+        scene = self.folder / "c.toml"
+        text = 'name = "models"\nseed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n[sun]\ncolour = [0.1234567, 0.5, 1]\n'
+        slowly = "key CTRL+A\ntype 2\nwait 0.2\ntype 5\nwait 0.2\ntype 0\nwait 0.2\n"
+        for leave in ("key ENTER", "key TAB", "click scene", ""):
+            for undo, size in (("", 250), ('click "tab View"\nkey CTRL+Z\n', 100)):
+                scene.write_text(text, encoding="utf-8")
+                self.edit(scene, script="wait-step 1\nclick lattice\nwait 0.2\ndouble-click-at lattice.cell_size_m 0.5 0.5\n"
+                                        f"{slowly}{leave}\nwait 0.2\n{undo}wait 0.2\nkey CTRL+S\nwait 0.5\n")
+                self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("= 100", f"= {size}"), leave)
+        for leave, first in (("key ESCAPE", "0.1234567"), ("key ENTER", "0.7654321")):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script="wait-step 1\nclick sun\nwait 0.2\ndouble-click-at sun.colour[0] 0.5 0.5\nkey CTRL+A\ntype 0.7654321\n"
+                                    f"wait 0.2\n{leave}\nwait 0.2\nkey CTRL+S\nwait 0.5\n")
+            self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("0.1234567", first))
+
     def test_names_that_are_empty_are_drawn(self):
         scene = self.models()
         scene.write_text(MODELS.replace('"bank"', '""').replace('"few"', '""'), encoding="utf-8")
