@@ -37,11 +37,16 @@ bool is_trusted_link(const std::filesystem::path& link) {
 // Returns false where that was not possible.
 bool take_access_list(int folder, const std::string& name, int to) {
     constexpr const char* kAttribute = "system.posix_acl_access";
-    const std::string from = "/proc/self/fd/" + std::to_string(folder) + "/" + name;
+    const Descriptor old(::openat(folder, name.c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC));
+    // One that may not be read has a list all the same, by its path in a folder that is open.
+    const std::string path = "/proc/self/fd/" + std::to_string(folder) + "/" + name;
     std::vector<char> list(1024);
+    const auto read = [&] {
+        return old.get() >= 0 ? ::fgetxattr(old.get(), kAttribute, list.data(), list.size())
+                              : ::getxattr(path.c_str(), kAttribute, list.data(), list.size());
+    };
     ssize_t size = 0;
-    while ((size = ::getxattr(from.c_str(), kAttribute, list.data(), list.size())) < 0 && errno == ERANGE)
-        list.resize(2 * list.size());
+    while ((size = read()) < 0 && errno == ERANGE) list.resize(2 * list.size());
     const auto is_none = [] { return errno == ENODATA || errno == ENOTSUP; };
     if (size >= 0) return ::fsetxattr(to, kAttribute, list.data(), std::size_t(size), 0) == 0;
     return is_none() && (::fremovexattr(to, kAttribute) == 0 || is_none());

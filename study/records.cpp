@@ -130,7 +130,7 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
     files_.push_back({std::filesystem::path(path).replace_extension(".series"), folders_ - 1});
     const std::filesystem::path& series_path = files_.back().path;
     std::uint64_t at = 0, bytes = 0, series = 0;
-    std::string problem;
+    std::string problem, damaged_end;
     const auto note = [&](std::uint64_t place, std::string_view message) {
         if (problem.empty())
             problem = fmt::format("{}: the record at byte {} {}", path.string(), place, message);
@@ -161,8 +161,9 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
         }
     }
     check_reading(stream, path);
-    // What an append that was cut short left has no end of a line. Commands that go on write its run anew.
-    if (torn && use != RecordsFor::running && !cut_short) note(bytes, "is damaged");
+    // What an append that was cut short left has no end of a line.
+    if (torn && !cut_short)
+        damaged_end = fmt::format("{}: the record at byte {} is damaged", path.string(), bytes);
     // Series are written before the records that name them: fewer are damage, and not to be filled with zeros. Their size is
     // asked for after the last record was read, as another process may be writing both.
     std::error_code error;
@@ -188,7 +189,7 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
     // Begun again with --overwrite meanwhile, the records are of the old shard and the series of the new one, or of neither.
     constexpr std::chrono::milliseconds kPause(50);
     constexpr int kMostLooks = 40;
-    if (!problem.empty() && look < kMostLooks) {
+    if ((!problem.empty() || !damaged_end.empty()) && look < kMostLooks) {
         std::this_thread::sleep_for(kPause);
         if (!(file_stamp(path) == begun && file_stamp(series_path) == begun_series)) {
             files_.pop_back();
@@ -198,8 +199,16 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
     }
     for (PlacedRecord& one : found)
         if (one.is_sound) take(std::move(one.record));
-    if (!problem.empty()) problems_.push_back(problem);
+    if (!problem.empty())
+        problems_.push_back(problem);
+    else if (!damaged_end.empty())
+        damaged_ends_.push_back(damaged_end);
     return {bytes, series};
+}
+
+void Records::count_damaged_ends_as_problems() {
+    problems_.insert(problems_.end(), damaged_ends_.begin(), damaged_ends_.end());
+    damaged_ends_.clear();
 }
 
 void Records::take(RunRecord record) {

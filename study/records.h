@@ -40,11 +40,11 @@ std::string record_line(const PlannedRun& run, const RunResult& result, std::uin
                         std::string_view series);
 std::string failure_line(const PlannedRun& run, std::string_view message);
 
-// What the records are read for: it decides what helps against those of another version.
+// What the records are read for: it decides what helps against those of another version, and against files that cannot be
+// read.
 enum class RecordsFor {
-    running,   // by a command that has --overwrite, and writes runs
-    counting,  // by the same with --status
-    showing,   // by one that writes no records
+    running,  // by a command that has --overwrite, and writes runs
+    showing,  // by one that writes no records
 };
 
 // Selects the records whose packed series are compared with their hashes, by their run's id; empty: all. It takes a pass over
@@ -59,10 +59,13 @@ class Records {
     static Records read(const std::vector<std::filesystem::path>& folders,
                         RecordsFor use = RecordsFor::running, const CheckedRuns& checked = {});
 
-    // "PATH: what is wrong", one a file; the last record of a shard, where an append was cut short, is no
-    // problem; where it is damaged, it is one unless runs are written. A run whose packed series are not as
-    // they were written is left out.
+    // "PATH: what is wrong", one a file. A run whose packed series are not as they were written is left out. The last record
+    // of a shard is no problem of its own: where an append was cut short, and where it is damaged.
     const std::vector<std::string>& problems() const { return problems_; }
+    // Shards whose last record is whole, and damaged, in the same form: whether that cost a run depends on the plan, as it may
+    // be in another shard, or have been done once more.
+    const std::vector<std::string>& damaged_ends() const { return damaged_ends_; }
+    void count_damaged_ends_as_problems();
 
     const RunRecord* find(const std::string& id) const;
     std::size_t size() const { return runs_.size(); }
@@ -87,7 +90,7 @@ class Records {
     void take(RunRecord record);
 
     std::unordered_map<std::string, RunRecord> runs_;
-    std::vector<std::string> problems_;
+    std::vector<std::string> problems_, damaged_ends_;
     std::vector<SeriesFile> files_;  // by RunRecord::shard
     std::size_t folders_ = 0;        // that were begun
 };

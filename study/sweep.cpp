@@ -212,7 +212,12 @@ bool has_runs_of(const SweepPlan& plan, const std::filesystem::path& folder) {
 }
 
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job) {
-    return status_of(plan, job, Records::read({job.folder}, RecordsFor::counting));
+    const Records records = Records::read({job.folder});
+    SweepReport report = status_of(plan, job, records);
+    if (!report.complete)
+        report.problems.insert(report.problems.end(), records.damaged_ends().begin(),
+                               records.damaged_ends().end());
+    return report;
 }
 
 SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
@@ -327,8 +332,13 @@ Records records_of_folders(const SweepPlan& plan, const std::vector<std::filesys
     Records records = Records::read(folders, RecordsFor::showing);
     const std::vector<std::uint64_t> all = records.sizes_of_folders();
     std::vector<std::uint64_t> used(all.size(), 0);
-    for (std::uint64_t n = 0; n < plan.runs(); ++n)
-        if (const RunRecord* record = records.find(plan.run(n).id)) ++used[records.folder_of(*record)];
+    bool complete = true;
+    for (std::uint64_t n = 0; n < plan.runs(); ++n) {
+        const RunRecord* record = records.find(plan.run(n).id);
+        complete = complete && record != nullptr;
+        if (record != nullptr) ++used[records.folder_of(*record)];
+    }
+    if (!complete) records.count_damaged_ends_as_problems();
     for (std::size_t n = 1; n < folders.size(); ++n) {
         if (all[n] == 0 || used[n] > 0) continue;
         throw Error(ErrorCode::usage,

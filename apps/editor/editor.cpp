@@ -335,8 +335,12 @@ Editor::Editor(const EditorOptions& from)
 Editor::~Editor() = default;
 
 void say(Editor& editor, std::string message, bool is_bad) {
-    editor.message = std::move(message);
-    editor.message_is_bad = is_bad;
+    // Ctrl+S leaves a field first, whose text may be refused: what is saved is told behind that.
+    const bool just_refused =
+        editor.message_is_bad && Clock::now() - editor.message_time < std::chrono::seconds(1);
+    const bool goes_on = just_refused && !is_bad;
+    editor.message = goes_on ? editor.message + " - " + message : std::move(message);
+    editor.message_is_bad = is_bad || goes_on;
     editor.message_time = Clock::now();
 }
 

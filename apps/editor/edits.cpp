@@ -28,18 +28,20 @@ bool change_text(Editor& editor, const TextEdit& edit, const std::string& what, 
     return attempt(editor, [&] { editor.document->edit(edit(editor.document->text()), what, merge); });
 }
 
-void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging) {
-    set_values(editor, TextPath(path.begin(), path.end() - 1), {{path.back().name, value}}, dragging);
+void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging,
+               NumberForm form) {
+    set_values(editor, TextPath(path.begin(), path.end() - 1), {{path.back().name, value}}, dragging, form);
 }
 
-void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging) {
+void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging,
+                NumberForm form) {
     TextPath path = table;
     path.push_back({entries.front().first, 0});
     const std::string name = path_text(path);
     const auto changed = [&](std::string text) {
         for (const auto& [key, value] : entries) {
             path.back().name = key;
-            text = with_value(text, path, value);
+            text = with_value(text, path, value, form);
         }
         return text;
     };

@@ -16,8 +16,8 @@
 namespace nephos {
 namespace {
 
-// ImGui takes no private characters of the keyboard: those of the field are of scripts that its font does not have (Yi,
-// Vai, Bamum and their neighbours).
+// ImGui takes no private characters of the keyboard: those of the field are of scripts that its font does not have (from Yi
+// to Cherokee).
 constexpr unsigned kFirstOfTable = 0xA000, kLastOfTable = 0xABFF, kFirstPrivate = 0xE000,
                    kLastPrivate = 0xF8FF;
 constexpr unsigned kLastOfField = 0xFFFF;

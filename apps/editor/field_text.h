@@ -28,9 +28,9 @@ unsigned field_character(unsigned code);
 bool input_text(const char* label, std::string& text, const char* hint = nullptr,
                 ImGuiInputTextFlags flags = 0);
 
-// Shows a value in a field of one line. Returns true in the frame after the field was left with another text, by Enter,
-// Tab, a click or a window that opens over it; only then `text` is changed, to what was typed. Escape brings back what
-// was there.
+// Shows a value in a field of one line. Returns true once the field was left with another text, by Enter, Tab, a click or a
+// window that opens over it (at the latest in the frame after that, or, where it is not drawn, when it is again); only then
+// `text` is changed, to what was typed. Escape brings back what was there.
 bool input_value(const char* label, std::string& text, ImGuiInputTextFlags flags = 0);
 
 // As ImGui::InputTextMultiline(), but returns whether the text was changed. Lines keep their ends; what is added has those of

@@ -244,7 +244,7 @@ std::optional<std::string> value_now(const Editor& editor, const TextPath& path)
     if (!is_sun(path) || !editor.shown_scene || editor.shown_scene->sun_path.empty()) return std::nullopt;
     const Sun sun = sun_now(editor);
     if (path[1].name == "colour") return colour_toml(sun.colour);
-    return number_text(path[1].name == "azimuth_deg" ? sun.azimuth_deg : sun.elevation_deg);
+    return number_text(path[1].name == "azimuth_deg" ? sun.azimuth_deg : sun.elevation_deg, 6);
 }
 
 void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dragging) {

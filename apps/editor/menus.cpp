@@ -177,18 +177,19 @@ void status_bar(Editor& editor) {
     const float rates = 26 * ImGui::GetFontSize();
     const bool refused = fresh && editor.message_is_bad && !editor.message.empty();
     if (problems > 0) {
-        ImGui::PushStyleColor(ImGuiCol_Text, red);
         const std::string text = refused ? editor.message
                                          : std::to_string(problems) +
                                                (problems == 1 ? " problem: " : " problems: ") +
                                                editor.document->problems().front().message;
-        if (ImGui::Selectable(text.substr(0, 160).c_str(), false, 0,
-                              ImVec2(std::max(1.0f, ImGui::GetContentRegionAvail().x - rates), 0))) {
-            editor.wanted_tab = 2;
-        }
+        const ImVec2 room(std::max(1.0f, ImGui::GetContentRegionAvail().x - rates), 0);
+        if (ImGui::Selectable("##problems", false, 0, room)) editor.wanted_tab = 2;
+        const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
+        const ImVec4 clip(low.x, low.y, high.x, high.y);
+        // Not as its label, in which `##` has a meaning.
+        ImGui::GetWindowDrawList()->AddText(nullptr, 0, low, ImGui::GetColorU32(red), text.data(),
+                                            text.data() + text.size(), 0, &clip);
         editor.controls.note("problems");
         if (refused) editor.controls.note("refusal");
-        ImGui::PopStyleColor();
     } else if (fresh && !editor.message.empty()) {
         if (editor.message_is_bad) ImGui::PushStyleColor(ImGuiCol_Text, red);
         ImGui::TextUnformatted(editor.message.substr(0, 200).c_str());

@@ -50,6 +50,27 @@ const Node* default_node(Editor& editor, const Key& key, const TextPath& path) {
     return made.kind == Node::Kind::table ? nullptr : &made;
 }
 
+// The names of models that the scene has from files.
+std::vector<std::string> names_from_files(const Editor& editor) {
+    std::vector<std::string> names;
+    for (std::size_t n = 0; n < models_from_files(editor); ++n)
+        names.push_back(editor.document->scene()->models[n].name);
+    return names;
+}
+
+NumberForm form_of(const Key& key) {
+    switch (key.kind) {
+        case KeyKind::integer:
+        case KeyKind::count:
+        case KeyKind::counts:
+        case KeyKind::extent:
+        case KeyKind::seed:
+            return NumberForm::integer;
+        default:
+            return NumberForm::any;
+    }
+}
+
 void value_row(Editor& editor, const ValueRow& row) {
     const std::string name = path_text(row.path);
     ImGui::TableNextRow();
@@ -69,11 +90,12 @@ void value_row(Editor& editor, const ValueRow& row) {
         if (row.key.name == "name" && row.path.size() > 1 && value->starts_with('"')) {
             const Node typed = parsed_value(*value);
             const auto renamed = [&](const std::string& text) {
-                return with_new_name(text, editor.document->values(), row.path, typed.text);
+                return with_new_name(text, editor.document->values(), row.path, typed.text,
+                                     names_from_files(editor));
             };
             change_text(editor, renamed, "Rename to " + typed.text);
         } else {
-            set_value(editor, row.path, *value, dragging);
+            set_value(editor, row.path, *value, dragging, form_of(row.key));
         }
     }
     editor.controls.note(name);

@@ -283,19 +283,24 @@ void add_users(const Node& node, std::string_view places, const std::string& nam
 
 }  // namespace
 
-std::string with_new_name(std::string text, const Node& values, const TextPath& path,
-                          const std::string& name) {
+std::string with_new_name(std::string text, const Node& values, const TextPath& path, const std::string& name,
+                          const std::vector<std::string>& elsewhere) {
     const Node* old = value_node(values, path);
     const std::string was = old != nullptr ? old->text : "";
-    const std::vector<std::string> taken =
-        path.size() == 3 ? names_of(value_node(values, {path.front()})) : std::vector<std::string>();
-    if (name != was && std::ranges::count(taken, name) > 0)
-        throw Error(ErrorCode::usage, "Not renamed: there is another \"" + shortened(name) + "\" already");
-    text = with_value(text, path, toml_string(name));
     const bool of_model = path.size() == 3 && path[0].name == "model";
     const bool of_sky = path.size() == 3 && path[0].name == "sky";
+    const std::vector<std::string> taken =
+        path.size() == 3 ? names_of(value_node(values, {path.front()})) : std::vector<std::string>();
+    const bool is_of_file = of_model && std::ranges::count(elsewhere, name) > 0;
+    if (name != was && (std::ranges::count(taken, name) > 0 || is_of_file))
+        throw Error(ErrorCode::usage, "Not renamed: there is another \"" + shortened(name) + "\" already" +
+                                          (is_of_file ? ", in a file that the scene names" : ""));
+    if (name.empty() && (of_model || of_sky))
+        throw Error(ErrorCode::usage,
+                    "Not renamed: the name is empty, and what refers to it would name nothing");
+    text = with_value(text, path, toml_string(name));
     // Of two elements of one name nobody knows which one is meant.
-    if (was.empty() || (!of_model && !of_sky) || std::ranges::count(taken, was) > 1) return text;
+    if (old == nullptr || (!of_model && !of_sky) || std::ranges::count(taken, was) > 1) return text;
     const std::vector<std::string> uses =
         of_sky ? std::vector<std::string>{"layer.*.skies"}
                : std::vector<std::string>{"sky.*.models", "layer.*.rain.attached.*.model",

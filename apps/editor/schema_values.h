@@ -53,8 +53,9 @@ std::string unused_name(std::string_view start, const std::vector<std::string>& 
 std::vector<std::string> names_of(const Node* array);
 
 // Gives an element another name, and changes what refers to it: skies, rain areas and metamorphoses to models, layers to
-// skies. Throws Error(usage) where another element of the array has that name.
-std::string with_new_name(std::string text, const Node& values, const TextPath& path,
-                          const std::string& name);
+// skies. `elsewhere`: names of models that the scene has from files. Throws Error(usage) where the name is empty, or another element
+// of the array or one from a file has it.
+std::string with_new_name(std::string text, const Node& values, const TextPath& path, const std::string& name,
+                          const std::vector<std::string>& elsewhere);
 
 }  // namespace nephos

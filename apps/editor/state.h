@@ -222,10 +222,11 @@ bool attempt(Editor& editor, const std::function<void()>& act);
 using TextEdit = std::function<std::string(const std::string& text)>;
 bool change_text(Editor& editor, const TextEdit& edit, const std::string& what,
                  const std::string& merge = {});
-void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging = false);
+void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging = false,
+               NumberForm form = NumberForm::any);
 // Several keys of a table as one step of the history.
 void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries,
-                bool dragging = false);
+                bool dragging = false, NumberForm form = NumberForm::any);
 void open_document(Editor& editor, std::unique_ptr<SceneDocument> document);
 // Ends what waited for an answer about unsaved edits.
 void do_pending(Editor& editor);

@@ -49,8 +49,7 @@ std::string number_list(const std::vector<double>& numbers, bool integers) {
     return numbers.size() > 1 ? out + "]" : out;
 }
 
-// Returns as many digits as the number has, at least six: a field that is typed into begins with what it shows, and a
-// drag is rounded to as many.
+// Returns as many digits as the number has, at least six: a field that is typed into begins with what it shows.
 std::string number_format(double number) {
     int digits = 6;
     while (digits < 17 && std::isfinite(number) && number_of_text(number_text(number, digits)) != number)
@@ -113,6 +112,8 @@ bool drag_numbers(Editor& editor, const ValueRow& row, std::vector<double>& numb
                                                       : number_format(numbers[n]);
         changed |= ImGui::DragScalar("##number", ImGuiDataType_Double, &numbers[n], speed, nullptr, nullptr,
                                      format.c_str());
+        const std::string whole = number_text(numbers[n]);
+        if (ImGui::CalcTextSize(whole.c_str()).x > width) tooltip_of_last(whole.c_str());
         if (numbers.size() > 1) editor.controls.note(path_text(row.path) + "[" + std::to_string(n) + "]");
         ImGui::PopID();
     }

@@ -267,7 +267,7 @@ void add_export_command(CLI::App& app, Action& action) {
     add_shape_options(*command, a);
     command
         ->add_option("--velocity", a->options.velocity_name,
-                     "Write the wind into VDB files as a grid of this name")
+                     "Write the wind into VDB files as a grid of this name (letters, digits, _)")
         ->type_name("NAME");
     command->add_flag("--zip", a->options.zip, "Compress vti and nvdb by zlib");
     add_value(*command, "--quantise", "BITS", "Values of nvdb: none, fp8 or fp16",

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <optional>
 
@@ -216,10 +217,14 @@ bool is_same_number(std::string_view a, std::string_view b) {
     return first && first == number_of(b) && std::signbit(*first) == std::signbit(*number_of(b));
 }
 
-std::vector<Change> replaced_value(std::string_view text, const TomlNode& node, std::string_view value) {
-    if (node.form == Form::value &&
-        is_same_number(text.substr(node.value.begin, node.value.end - node.value.begin), value))
-        return {};
+std::vector<Change> replaced_value(std::string_view text, const TomlNode& node, std::string_view value,
+                                   NumberForm form) {
+    const auto stays = [&](const TextRegion& region, std::string_view by) {
+        const std::string_view was = text.substr(region.begin, region.end - region.begin);
+        const bool may_stay = form == NumberForm::any || was.find_first_of(".eEnf") == kNone;
+        return may_stay && is_same_number(was, by);
+    };
+    if (node.form == Form::value && stays(node.value, value)) return {};
     if (node.form != Form::array || !value.starts_with('[')) return {{node.value, std::string(value)}};
     const std::string whole = "v = " + std::string(value);
     const TomlNode parsed = toml_tree(whole);
@@ -229,44 +234,9 @@ std::vector<Change> replaced_value(std::string_view text, const TomlNode& node, 
     for (std::size_t n = 0; n < items.size(); ++n) {
         const TextRegion was = node.items[n].value, now = items[n].value;
         const std::string by = whole.substr(now.begin, now.end - now.begin);
-        if (!is_same_number(text.substr(was.begin, was.end - was.begin), by)) changes.push_back({was, by});
+        if (!stays(was, by)) changes.push_back({was, by});
     }
     return changes;
-}
-
-// Returns the text with some items of an array more or less, and all else in it as it was, comments too; nothing where
-// others changed.
-std::optional<std::string> with_items(std::string_view text, const TextPath& path, const TomlNode& node,
-                                      std::string_view value) {
-    if (node.form != Form::array || !value.starts_with('[')) return std::nullopt;
-    const std::string whole = "v = " + std::string(value);
-    const TomlNode parsed = toml_tree(whole);
-    const std::vector<TomlNode>&was = node.items, &now = parsed.find("v")->items;
-    if (was.empty() || now.empty() || was.size() == now.size()) return std::nullopt;
-    const auto text_of = [](std::string_view in, const TomlNode& item) {
-        return in.substr(item.value.begin, item.value.end - item.value.begin);
-    };
-    const std::size_t fewer = std::min(was.size(), now.size());
-    std::size_t before = 0, behind = 0;
-    while (before < fewer && is_same_number(text_of(text, was[before]), text_of(whole, now[before])))
-        ++before;
-    while (behind < fewer - before && is_same_number(text_of(text, was[was.size() - 1 - behind]),
-                                                     text_of(whole, now[now.size() - 1 - behind])))
-        ++behind;
-    if (before + behind < fewer) return std::nullopt;
-    std::string out(text);
-    if (now.size() < was.size()) {
-        TextPath item = path;
-        item.push_back({{}, before});
-        for (std::size_t n = now.size(); n < was.size(); ++n) out = without(out, item);
-        return out;
-    }
-    std::string more;
-    for (std::size_t n = before; n < now.size() - behind; ++n) {
-        const std::string item(text_of(whole, now[n]));
-        more += before > 0 ? ", " + item : item + ", ";
-    }
-    return out.insert(before > 0 ? was[before - 1].value.end : was.front().value.begin, more);
 }
 
 // Where the comma after an element ends, without skipping a comment; the element's end when there is none.
@@ -370,6 +340,101 @@ std::vector<Change> removed_element(std::string_view text, const TomlNode& array
     return {without_item(text, item, before, next)};
 }
 
+// Adds an item to an array behind another one, in a line of its own where that one has one.
+std::vector<Change> added_behind(std::string_view text, const TextRegion& other, const std::string& item) {
+    const std::size_t comma = after_comma(text, other.end), line = rest_of_line(text, comma);
+    if (!begins_line(text, other.begin) || line == kNone || comma_behind_comment(text, other.end) != kNone)
+        return {{{other.end, other.end}, ", " + item}};
+    const bool has_comma = comma > other.end;
+    std::vector<Change> changes;
+    if (!has_comma) changes.push_back({{other.end, other.end}, ","});
+    changes.push_back(
+        {{line, line}, indent_at(text, other.begin) + item + (has_comma ? "," : "") + newline_of(text)});
+    return changes;
+}
+
+// The same before another one.
+Change added_before(std::string_view text, const TextRegion& other, const std::string& item) {
+    if (!begins_line(text, other.begin)) return {{other.begin, other.begin}, item + ", "};
+    return {{other.begin, other.begin}, item + "," + newline_of(text) + indent_at(text, other.begin)};
+}
+
+// Returns, for each item of an array, the place among `now` of the one that it is, or kNone: the longest common sequence.
+// Nothing for arrays that are so long that it takes too much time.
+std::optional<std::vector<std::size_t>> common_items(const std::vector<std::string_view>& was,
+                                                     const std::vector<std::string_view>& now) {
+    constexpr std::size_t kMostPairs = 4'000'000;
+    if (was.size() * now.size() > kMostPairs) return std::nullopt;
+    const std::size_t width = now.size() + 1;
+    std::vector<std::uint16_t> longest((was.size() + 1) * width, 0);  // of the rests
+    for (std::size_t i = was.size(); i-- > 0;) {
+        for (std::size_t k = now.size(); k-- > 0;) {
+            const std::size_t at = i * width + k;
+            longest[at] = is_same_number(was[i], now[k]) ? std::uint16_t(longest[at + width + 1] + 1)
+                                                         : std::max(longest[at + width], longest[at + 1]);
+        }
+    }
+    std::vector<std::size_t> found(was.size(), kNone);
+    for (std::size_t i = 0, k = 0; i < was.size() && k < now.size();) {
+        const std::size_t at = i * width + k;
+        if (is_same_number(was[i], now[k]))
+            found[i++] = k++;
+        else if (longest[at + width] >= longest[at + 1])
+            ++i;
+        else
+            ++k;
+    }
+    return found;
+}
+
+// Returns the text with items of an array more or less, and all else in it as it was, comments too; nothing where none of
+// them stays.
+std::optional<std::string> with_items(std::string_view text, const TextPath& path, const TomlNode& node,
+                                      std::string_view value) {
+    if (node.form != Form::array || !value.starts_with('[')) return std::nullopt;
+    const std::string whole = "v = " + std::string(value);
+    const TomlNode parsed = toml_tree(whole);
+    const auto texts_of = [](std::string_view in, const std::vector<TomlNode>& items) {
+        std::vector<std::string_view> texts;
+        for (const TomlNode& item : items)
+            texts.push_back(in.substr(item.value.begin, item.value.end - item.value.begin));
+        return texts;
+    };
+    const std::vector<std::string_view> was = texts_of(text, node.items),
+                                        now = texts_of(whole, parsed.find("v")->items);
+    if (was.size() == now.size()) return std::nullopt;
+    const auto found = common_items(was, now);
+    if (!found) return std::nullopt;
+    const std::size_t kept = was.size() - std::size_t(std::ranges::count(*found, kNone));
+    if (kept == 0 && !was.empty() && !now.empty()) return std::nullopt;
+    std::string out(text);
+    TextPath item = path;
+    item.push_back({});
+    for (std::size_t n = was.size(); n-- > 0;) {
+        item.back().index = n;
+        if ((*found)[n] == kNone) out = without(out, item);
+    }
+    // From the last one, so that what stands before it stays where it is.
+    const TomlNode root = toml_tree(out);
+    const TomlNode& left = *find_node(root, path);
+    std::vector<std::size_t> places;
+    std::ranges::copy_if(*found, std::back_inserter(places),
+                         [](std::size_t place) { return place != kNone; });
+    std::size_t next = places.size();  // of those that stay, the one behind `k`
+    for (std::size_t k = now.size(); k-- > 0;) {
+        const std::string more(now[k]);
+        if (next > 0 && places[next - 1] == k)
+            --next;
+        else if (next > 0)
+            out = applied(out, added_behind(out, left.items[next - 1].value, more));
+        else if (kept > 0)
+            out = applied(out, {added_before(out, left.items.front().value, more)});
+        else
+            out.insert(left.value.begin + 1, k + 1 < now.size() ? more + ", " : more);
+    }
+    return out;
+}
+
 // Removes a key between the braces of its table.
 std::vector<Change> removed_in_braces(std::string_view text, const TomlNode& node) {
     std::vector<Change> changes;
@@ -431,14 +496,14 @@ const TomlNode* find_node(const TomlNode& root, const TextPath& path) {
     return reached.steps == path.size() ? reached.node : nullptr;
 }
 
-std::string with_value(std::string_view text, const TextPath& path, std::string_view value) {
+std::string with_value(std::string_view text, const TextPath& path, std::string_view value, NumberForm form) {
     const TomlNode root = toml_tree(text);
     const Reached reached = reach(root, path);
     if (reached.steps < path.size()) return applied(text, {missing_key(text, root, path, reached, value)});
     const TomlNode& node = *reached.node;
     if (node.form == Form::value || node.form == Form::array || node.form == Form::inlined) {
         if (std::optional<std::string> items = with_items(text, path, node, value)) return *std::move(items);
-        return applied(text, replaced_value(text, node, value));
+        return applied(text, replaced_value(text, node, value, form));
     }
     refuse(path, "is a table: its keys are set one by one");
 }
@@ -488,16 +553,7 @@ std::string with_new_element(std::string_view text, const TextPath& array, std::
     }
     const TextRegion last =
         after && *after < node.items.size() ? node.items[*after].value : node.items.back().value;
-    const std::size_t comma = after_comma(text, last.end), line = rest_of_line(text, comma);
-    if (!begins_line(text, last.begin) || line == kNone || comma_behind_comment(text, last.end) != kNone) {
-        return applied(text, {{{last.end, last.end}, ", " + element}});
-    }
-    const bool has_comma = comma > last.end;
-    std::vector<Change> changes;
-    if (!has_comma) changes.push_back({{last.end, last.end}, ","});
-    changes.push_back(
-        {{line, line}, indent_at(text, last.begin) + element + (has_comma ? "," : "") + newline});
-    return applied(text, changes);
+    return applied(text, added_behind(text, last, element));
 }
 
 std::string with_copied_element(std::string_view text, const TextPath& array, std::size_t index) {
@@ -524,17 +580,7 @@ std::string with_copied_element(std::string_view text, const TextPath& array, st
         return applied(text, {{{at, at}, by}});
     }
     const std::string copy(text.substr(item.value.begin, item.value.end - item.value.begin));
-    const std::size_t comma = after_comma(text, item.value.end), line = rest_of_line(text, comma);
-    if (!begins_line(text, item.value.begin) || line == kNone ||
-        comma_behind_comment(text, item.value.end) != kNone) {
-        return applied(text, {{{item.value.end, item.value.end}, ", " + copy}});
-    }
-    const bool has_comma = comma > item.value.end;
-    std::vector<Change> changes;
-    if (!has_comma) changes.push_back({{item.value.end, item.value.end}, ","});
-    changes.push_back(
-        {{line, line}, indent_at(text, item.value.begin) + copy + (has_comma ? "," : "") + newline});
-    return applied(text, changes);
+    return applied(text, added_behind(text, item.value, copy));
 }
 
 }  // namespace nephos

@@ -38,9 +38,14 @@ std::string path_text(const TextPath& path);
 // Returns the node at a path; null when it is not there.
 const TomlNode* find_node(const TomlNode& root, const TextPath& path);
 
+// The numbers that a key takes. One that is set to itself keeps its form: `1.0e3` where 1000 is set, but for integers, where
+// 1 mends a `1.0`.
+enum class NumberForm { any, integer };
+
 // Sets a key to a value, which is TOML on one line. A key that is not there is added: to its table after the last key,
-// or in a new section at the end. Of an array that is replaced by one as long, only the items that differ change.
-std::string with_value(std::string_view text, const TextPath& path, std::string_view value);
+// or in a new section at the end. Of an array only the items change that differ, come or go: comments between the others stay.
+std::string with_value(std::string_view text, const TextPath& path, std::string_view value,
+                       NumberForm form = NumberForm::any);
 
 // Removes a key with its line, a table with all of its sections, or an element of an array; of a section also the
 // comment directly above it. Returns the text as it is when there is nothing at the path.

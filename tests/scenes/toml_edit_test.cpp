@@ -86,24 +86,36 @@ TEST(TomlEdit, NumbersThatStayAreWrittenAsTheyWere) {
     EXPECT_EQ(with_value(text, text_path("b"), "1.25"),
               "a = [1.0e3, -3_200.5, 2] # place\nb = 1.25\nc = 0x2A\n");
     EXPECT_EQ(with_value("z = 0.0", text_path("z"), "-0.0"), "z = -0.0");
+    EXPECT_EQ(with_value("z = 1.0 # no integer", text_path("z"), "1", NumberForm::integer),
+              "z = 1 # no integer");
+    EXPECT_EQ(with_value("z = [1.0, 2_000, 3]", text_path("z"), "[1, 2000, 4]", NumberForm::integer),
+              "z = [1, 2_000, 4]");
     EXPECT_EQ(with_value("z = 9007199254740993", text_path("z"), "9007199254740992"), "z = 9007199254740992");
 }
 
 TEST(TomlEdit, ItemsOfAnArrayComeAndGoBesideComments) {
     const std::string text = "skies = [\n    \"few\", # of few\n    \"many\", # of many\n    \"rain\",\n]\n";
     const TextPath path = text_path("skies");
-    EXPECT_EQ(with_value(text, path, "[\"few\", \"many\", \"new\", \"rain\"]"),
-              "skies = [\n    \"few\", # of few\n    \"many\", \"new\", # of many\n    \"rain\",\n]\n");
-    EXPECT_EQ(with_value(text, path, "[\"new\", \"few\", \"many\", \"rain\"]"),
-              "skies = [\n    \"new\", \"few\", # of few\n    \"many\", # of many\n    \"rain\",\n]\n");
-    const std::string fewer = with_value(text, path, "[\"few\", \"rain\"]");
-    EXPECT_NE(fewer.find("# of few"), std::string::npos) << fewer;
-    Document document;
-    const std::optional<Node> read = document.parse(document.add_origin("fewer", fewer, true));
-    ASSERT_TRUE(read) << fewer;
-    ASSERT_EQ(read->find("skies")->value.items.size(), 2u) << fewer;
-    EXPECT_EQ(with_value(fewer, path, "[\"few\", \"many\", \"rain\"]").find("many") != std::string::npos,
-              true);
+    const std::string few = "    \"few\", # of few\n", many = "    \"many\", # of many\n",
+                      rain = "    \"rain\",\n";
+    const auto of = [](const std::string& lines) { return "skies = [\n" + lines + "]\n"; };
+    ASSERT_EQ(of(few + many + rain), text);
+    EXPECT_EQ(with_value(text, path, R"(["few", "many", "new", "rain"])"),
+              of(few + many + "    \"new\",\n" + rain));
+    EXPECT_EQ(with_value(text, path, R"(["new", "few", "many", "rain"])"),
+              of("    \"new\",\n" + few + many + rain));
+    EXPECT_EQ(with_value(text, path, R"(["a", "b", "few", "c", "d", "rain", "e"])"),
+              of("    \"a\",\n    \"b\",\n" + few + "    \"c\",\n    \"d\",\n" + rain + "    \"e\",\n"));
+    EXPECT_EQ(with_value(text, path, R"(["few", "rain"])"), of(few + rain));
+    EXPECT_EQ(with_value(of(few + rain), path, R"(["few", "many", "rain"])"),
+              of(few + "    \"many\",\n" + rain));
+    EXPECT_EQ(with_value(text, path, R"(["many"])"), of(many));
+    EXPECT_EQ(with_value(text, path, "[]"), of(""));
+    EXPECT_EQ(with_value("skies = [ # none\n]\n", path, R"(["few", "rain"])"),
+              "skies = [\"few\", \"rain\" # none\n]\n");
+    EXPECT_EQ(with_value("skies = [\n  1, # one\n  2 # two\n]\n", path, "[1, 2, 3]"),
+              "skies = [\n  1, # one\n  2, # two\n  3\n]\n");
+    EXPECT_EQ(with_value("skies = [1, 2]", path, "[0, 1, 3, 2, 4]"), "skies = [0, 1, 3, 2, 4]");
     EXPECT_EQ(with_value(text, path, "[\"x\", \"y\"]"), "skies = [\"x\", \"y\"]\n");
 }
 

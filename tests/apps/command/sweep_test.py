@@ -776,7 +776,6 @@ sd = 0.05
         content = path.read_bytes()
         path.write_bytes(content[:-9])
         self.assertIn("1 of 9 runs are missing", self.call("merge", "one", "--out", "cut").stderr)
-        self.damage(path, -1)
         path.write_bytes(content[:content.rindex(b"done")] + b"dome" + content[content.rindex(b"done") + 4:])
         said = f"{path.name}: the record at byte {content[:-1].rindex(10) + 1} is damaged"
         for command in (("merge", "one", "--out", "new"), ("report", "one", "-o", "a.html")):
@@ -784,6 +783,18 @@ sd = 0.05
         self.assertIn(said, self.sweep("one", "--status", status=3).stderr)
         self.sweep("one")
         self.assertEqual(self.tables("one"), before)
+        # Of one shard of several, until the run is done in any of them.
+        for n in range(3):
+            self.sweep("three", "--shard", f"{n}/3")
+        path = self.folder / "three/shards/0001-of-0003.jsonl"
+        content = path.read_bytes()
+        path.write_bytes(content[:content.rindex(b"done")] + b"dome" + content[content.rindex(b"done") + 4:])
+        self.assertIn("is damaged", self.call("merge", "three", status=3).stderr)
+        self.assertIn("is damaged", self.sweep("three", "--status", status=3).stderr)
+        self.sweep("three")
+        self.call("merge", "three")
+        self.sweep("three", "--status")
+        self.assertEqual(self.tables("three"), before)
 
     def test_overwriting_a_shard_leaves_the_others(self):
         for shard in range(3):

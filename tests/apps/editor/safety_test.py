@@ -228,6 +228,25 @@ class Safety(Case):
                                     f"wait 0.2\n{leave}\nwait 0.2\nkey CTRL+S\nwait 0.5\n")
             self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("0.1234567", first))
 
+    def test_what_is_refused_is_told_by_ctrl_s_too(self):
+        """Names that a model of a file has, or that are empty, and a seed that is none: each is said, and the scene saved without."""
+        scene = self.folder / "r.toml"
+        (self.folder / "m.toml").write_text("seed = 1\n" + MODELS[MODELS.index("[[model]]"):MODELS.index("[[sky]]")], encoding="utf-8")
+        text = MODELS.replace("[[model]]", 'models = "m.toml"\n[[model]]', 1).replace('"bank"', '"own"')
+        for select, key, typed in (("click model\nclick model[0]", "model[0].name", "bank"), ("click model\nclick model[0]", "model[0].name", ""),
+                                   ("click scene", "seed", "##12abc")):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script=f"wait-step 1\n{select}\nclick \"tab Properties\"\nwait 0.3\nclick {key}\nkey CTRL+A\nkey BACKSPACE\n"
+                                    + (f"type {typed}\n" if typed else "") + "wait 0.2\nkey CTRL+S\nwait 0.5\nexpect-control refusal\n")
+            self.assertEqual(scene.read_text(encoding="utf-8"), text, key)
+
+    def test_an_integer_mends_a_number_that_is_none(self):
+        scene = self.folder / "i.toml"
+        text = 'name = "i"\nseed = 4\n[lattice]\ncells = [16.0, 14, 1_2] # odd\ncell_size_m = 1.0e2\n'
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script="wait 1\nclick lattice\nclick \"tab Properties\"\nwait 0.3\nset lattice.cells[1] 15\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+        self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("[16.0, 14,", "[16, 15,"))
+
     def test_names_that_are_empty_are_drawn(self):
         scene = self.models()
         scene.write_text(MODELS.replace('"bank"', '""').replace('"few"', '""'), encoding="utf-8")
@@ -258,10 +277,18 @@ class Safety(Case):
         scene = self.folder / "r.toml"
         scene.write_text(MODELS[:MODELS.index("[[model]]")] + 'models = "m.toml"\n' + MODELS[MODELS.index("[[sky]]"):], encoding="utf-8")
         self.edit(scene, script="wait 1\nexpect-control problems\n")
-        later = threading.Timer(5, lambda: (self.folder / "m.toml").write_text(
-            "seed = 1\n" + MODELS[MODELS.index("[[model]]"):MODELS.index("[[sky]]")], encoding="utf-8"))
-        later.start()
-        self.edit(scene, script="wait 7\nexpect-control problems\nclick \"menu File\"\nclick \"menu Reload\"\nwait-step 1\n")
+
+
+        def bring_models():
+            while not (self.folder / "ready.png").exists():
+                time.sleep(0.1)
+            other = self.folder / "other"
+            other.write_text("seed = 1\n" + MODELS[MODELS.index("[[model]]"):MODELS.index("[[sky]]")], encoding="utf-8")
+            other.rename(self.folder / "m.toml")
+
+        threading.Thread(target=bring_models, daemon=True).start()
+        self.edit(scene, script="wait 1\nscreenshot ready.png\nwait 2\nexpect-control problems\nclick \"menu File\"\nclick \"menu Reload\"\n"
+                                "wait-step 1\n")
 
     def test_scripts_without_commands_end(self):
         scene = self.models()

@@ -479,9 +479,9 @@ TEST(SchemaValues, RenamingFollowsReferences) {
         "[[layer]]\nname = \"l\"\nskies = \"s\"\n";
     const SceneDocument document(text);
     const std::string renamed =
-        with_new_name(text, document.values(), text_path("model[0].name"), "new \"a\"");
+        with_new_name(text, document.values(), text_path("model[0].name"), "new \"a\"", {});
     EXPECT_NE(renamed.find("models = [\"new \\\"a\\\"\", \"b\"] # two"), std::string::npos) << renamed;
-    EXPECT_NE(with_new_name(text, document.values(), text_path("sky[0].name"), "t").find("skies = \"t\""),
+    EXPECT_NE(with_new_name(text, document.values(), text_path("sky[0].name"), "t", {}).find("skies = \"t\""),
               std::string::npos);
 }
 
@@ -491,7 +491,7 @@ TEST(SchemaValues, RenamingFollowsRainAreasAndMetamorphoses) {
         "model = \"a\" }] }\n"
         "metamorphoses = [{ from = \"a\", to = \"b\" }, { from = \"b\", to = \"a\" }]\n";
     const SceneDocument document(text);
-    const std::string renamed = with_new_name(text, document.values(), text_path("model[0].name"), "c");
+    const std::string renamed = with_new_name(text, document.values(), text_path("model[0].name"), "c", {});
     EXPECT_NE(renamed.find("{ model = \"c\" }"), std::string::npos) << renamed;
     EXPECT_NE(renamed.find("[{ from = \"c\", to = \"b\" }, { from = \"b\", to = \"c\" }]"), std::string::npos)
         << renamed;
@@ -501,14 +501,15 @@ TEST(SchemaValues, RenamingToATakenNameIsRefused) {
     const std::string text =
         "[[model]]\nname = \"a\"\n[[model]]\nname = \"b\"\n[[sky]]\nname = \"s\"\nmodels = [\"a\", \"b\"]\n";
     const SceneDocument document(text);
-    EXPECT_THROW(with_new_name(text, document.values(), text_path("model[1].name"), "a"), Error);
-    EXPECT_EQ(with_new_name(text, document.values(), text_path("model[1].name"), "b"), text);
+    EXPECT_THROW(with_new_name(text, document.values(), text_path("model[1].name"), "a", {}), Error);
+    EXPECT_EQ(with_new_name(text, document.values(), text_path("model[1].name"), "b", {}), text);
     // Where two of a text have one name already, nobody knows which of them is meant.
     const std::string same =
         "[[model]]\nname = \"a\"\n[[model]]\nname = \"a\"\n[[sky]]\nname = \"s\"\nmodels = \"a\"\n";
     const SceneDocument doubled(same);
-    EXPECT_NE(with_new_name(same, doubled.values(), text_path("model[1].name"), "c").find("models = \"a\""),
-              std::string::npos);
+    EXPECT_NE(
+        with_new_name(same, doubled.values(), text_path("model[1].name"), "c", {}).find("models = \"a\""),
+        std::string::npos);
 }
 
 TEST(SchemaValues, OwnersAndDefaults) {
