@@ -16,6 +16,7 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/file_stamp.h"
+#include "core/folder_names.h"
 #include "core/paths.h"
 #include "scenes/format/writer.h"
 #include "simulation/manifest.h"
@@ -42,24 +43,14 @@ void remove_file(const std::filesystem::path& path) {
     if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
 }
 
-// Names of the files in a part of the folder ("." for itself); none when it is not there.
-std::vector<std::string> names_in(const RunFolder& folder, const std::string& part) {
-    std::vector<std::string> names;
-    std::error_code error;
-    for (std::filesystem::directory_iterator at(folder.folder / part, error), end; !error && at != end;
-         at.increment(error)) {
-        names.push_back(at->path().filename().string());
-    }
-    std::sort(names.begin(), names.end());
-    return names;
-}
-
 // Parts of the folder that hold frames: a folder of its own for the densities of each layer.
 std::vector<std::string> frame_parts(const RunFolder& folder) {
     std::vector<std::string> parts{"density", "frames"};
-    for (const std::string& name : names_in(folder, "density")) {
+    for (const std::string& name : names_in_folder(folder.folder / "density")) {
+        const std::filesystem::path path = folder.folder / "density" / name;
         std::error_code error;
-        const auto type = std::filesystem::symlink_status(folder.folder / "density" / name, error).type();
+        const auto type = std::filesystem::symlink_status(path, error).type();
+        if (type == std::filesystem::file_type::none) throw ReadFailure(path, error.message(), "examine");
         if (type == std::filesystem::file_type::directory) parts.push_back("density/" + name);
     }
     return parts;
@@ -87,12 +78,12 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     if (const std::string earlier = earlier_name(folder); !earlier.empty() && earlier != folder.name)
         names.push_back(earlier);
     for (const std::string& part : frame_parts(folder)) {
-        for (const std::string& file : names_in(folder, part)) {
+        for (const std::string& file : names_in_folder(folder.folder / part)) {
             if (std::ranges::any_of(names, [&](const std::string& name) { return is_frame_of(file, name); }))
                 files.push_back(folder.folder / part / file);
         }
     }
-    for (const std::string& name : names_in(folder, "statistics")) {
+    for (const std::string& name : names_in_folder(folder.folder / "statistics")) {
         const std::filesystem::path path = folder.folder / "statistics" / name;
         if (is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
     }
@@ -230,7 +221,7 @@ void remove_earlier_run(const RunFolder& folder) {
 
 void remove_leftovers(const RunFolder& folder) {
     const auto remove_if = [&](const std::string& part, const auto& is_ours) {
-        for (const std::string& name : names_in(folder, part)) {
+        for (const std::string& name : names_in_folder(folder.folder / part)) {
             const std::string published = published_name(name);
             if (!published.empty() && is_ours(published)) remove_file(folder.folder / part / name);
         }
@@ -249,7 +240,9 @@ void remove_leftovers(const RunFolder& folder) {
 void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs) {
     std::map<std::pair<std::uint64_t, std::uint64_t>, const RunInput*> begins_with;
     for (const RunInput& input : inputs) {
-        const FileStamp stamp = file_stamp(path_of(folder.folder, input.path));
+        const std::filesystem::path path = path_of(folder.folder, input.path);
+        const FileStamp stamp = file_stamp(path);
+        if (stamp.inode == 0 && is_there(path)) throw ReadFailure(path, "it changes", "examine");
         if (stamp.inode != 0) begins_with[{stamp.device, stamp.inode}] = &input;
     }
     if (begins_with.empty()) return;

@@ -2,6 +2,7 @@
 #include "simulation/verify.h"
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <set>
 #include <string>
@@ -15,6 +16,7 @@
 #include "core/descriptor.h"
 #include "core/digest.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "simulation/run_listing.h"
 #include "simulation/sealed_json.h"
 #include "simulation/statistics_file.h"
@@ -28,15 +30,21 @@ namespace {
 // Files of frames below the folder that the manifest does not list.
 std::vector<std::filesystem::path> extra_files(const RunListing& run, const std::set<std::string>& listed) {
     std::vector<std::filesystem::path> extra;
-    for (const char* part : {"density", "frames", "statistics"}) {
-        std::error_code error;
-        for (std::filesystem::recursive_directory_iterator at(run.folder / part, error), end;
-             !error && at != end; at.increment(error)) {
-            if (at->is_directory()) continue;
-            const std::filesystem::path path = at->path().lexically_relative(run.folder);
-            if (!listed.contains(path.generic_string())) extra.push_back(path);
-        }
-    }
+    const std::function<void(const std::filesystem::path&)> look_into =
+        [&](const std::filesystem::path& part) {
+            for (const std::string& name : names_in_folder(run.folder / part)) {
+                const std::filesystem::path path = part / name;
+                std::error_code error;
+                const auto type = std::filesystem::symlink_status(run.folder / path, error).type();
+                if (type == std::filesystem::file_type::none)
+                    throw ReadFailure(run.folder / path, error.message(), "examine");
+                if (type == std::filesystem::file_type::directory)
+                    look_into(path);
+                else if (!listed.contains(path.generic_string()))
+                    extra.push_back(path);
+            }
+        };
+    for (const char* part : {"density", "frames", "statistics"}) look_into(part);
     std::sort(extra.begin(), extra.end());
     return extra;
 }
@@ -214,8 +222,15 @@ Verification verify_run(const std::filesystem::path& folder, const VerifyOptions
     if (!recorded && has_density(run.scene))
         result.checks.push_back(
             {"digests", false, "the manifest, of an earlier version, has no checksums: run the scene anew"});
-    for (Check& check : check_files(folder, files, extra_files(run, names)))
-        result.checks.push_back(std::move(check));
+    std::vector<std::filesystem::path> extra;
+    Problems unlisted;
+    try {
+        extra = extra_files(run, names);
+    } catch (const ReadFailure& failure) {
+        unlisted.add(failure.what());
+    }
+    for (Check& check : check_files(folder, files, extra)) result.checks.push_back(std::move(check));
+    if (!unlisted.none()) result.checks.push_back(unlisted.not_done("listing"));
     if (!run.complete && !run.tables.empty()) result.checks.push_back(check_tables(run));
     if (options.against) result.checks.push_back(compare_runs(run, *options.against));
     if (!options.hashes_only) check_content(run, options, result.checks);

@@ -16,6 +16,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 
 namespace nephos {
 namespace {
@@ -52,13 +53,8 @@ void require_own_records(const std::filesystem::path& path) {
 
 std::vector<std::filesystem::path> files_of_shards(const std::filesystem::path& folder) {
     std::vector<std::filesystem::path> files;
-    std::error_code error;
-    std::filesystem::directory_iterator at(folder / "shards", error), end;
-    if (error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory) return files;
-    for (; !error && at != end; at.increment(error))
-        if (is_name_of_shard(at->path())) files.push_back(at->path());
-    if (error) throw ReadFailure(folder / "shards", error.message());
-    std::ranges::sort(files);
+    for (const std::string& name : names_in_folder(folder / "shards"))
+        if (is_name_of_shard(name)) files.push_back(folder / "shards" / name);
     return files;
 }
 

@@ -83,13 +83,24 @@ void take_new_results(Editor& editor, Clock::time_point& taken) {
     }
 }
 
+// Returns the text of a scene with what is being typed in it.
+std::string text_to_keep(const Editor& editor, const OpenScene& scene) {
+    const std::string& text = scene.document->text();
+    if (&scene != &editor || !editor.unfinished || scene.document->has_syntax_error()) return text;
+    try {
+        return editor.unfinished(text);
+    } catch (const Error&) {  // the text was changed meanwhile, and has no such place any more
+        return text;
+    }
+}
+
 // Writes the unsaved edits of all scenes down, of each whatever becomes of the others. Returns what could not be kept;
 // empty: all was.
 std::string autosave_all(Editor& editor) {
     std::string failures;
     for_each_scene(editor, [&](OpenScene& scene) {
         try {
-            scene.document->autosave(editor.folder);
+            scene.document->autosave(editor.folder, text_to_keep(editor, scene));
         } catch (const std::exception& error) {
             failures += (failures.empty() ? "" : "; ") + scene.document->title() + ": " + error.what();
         }
@@ -188,6 +199,7 @@ void draw_interface(Editor& editor) {
     const float scale = ImGui::GetFontSize() / 15;
     editor.controls.last = std::move(editor.controls.now);
     editor.controls.now.clear();
+    editor.unfinished = nullptr;
     shortcuts(editor);
     menu_bar(editor);
     layout(editor, scale);
@@ -257,8 +269,10 @@ int loop(Editor& editor, Report& report) {
         draw_interface(editor);
         update_title(editor, title);
         if (script.is_random()) editor.quit = false;
+        // Without a picture that could come, of what is wrong.
         const bool whole =
-            editor.picture && (editor.running || editor.picture->refined || !editor.view.detail);
+            editor.picture ? editor.running || editor.picture->refined || !editor.view.detail
+                           : !editor.document->problems().empty() || !editor.live->status().failure.empty();
         if (screenshot_due && seconds_since(report.begin) > editor.options.after_s && whole &&
             !script.is_active()) {
             editor.capture_to = editor.options.screenshot;
@@ -299,7 +313,7 @@ std::unique_ptr<SceneDocument> first_document(Editor& editor) {
 std::string kept_edits(Editor& editor) {
     bool any = false;
     for_each_scene(editor, [&](const OpenScene& scene) { any |= scene.document->is_modified(); });
-    if (!any) return {};
+    if (!any && !editor.unfinished) return {};
     const std::string failures = autosave_all(editor);
     if (!failures.empty()) return "; unsaved edits could not be kept: " + failures;
     return "; unsaved edits are kept, and are offered at the next start with this scene";
@@ -421,6 +435,10 @@ int run_editor(const EditorOptions& options) {
     for_each_scene(editor, [](OpenScene& scene) { scene.document->remove_autosave(); });
     keep_settings(editor);
     if (!failure.empty()) throw Error(ErrorCode::io, failure);
+    if (!options.screenshot.empty() && !editor.picture) {
+        if (!editor.document->problems().empty()) throw SceneErrors(editor.document->problems());
+        throw Error(ErrorCode::io, editor.live->status().failure);
+    }
     const std::vector<std::string> messages = editor.window->validation_messages();
     for (const std::string& message : messages) fmt::print(stderr, "validation: {}\n", message);
     return messages.empty() ? status : int(ErrorCode::gpu);

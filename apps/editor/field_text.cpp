@@ -334,6 +334,13 @@ bool input_value(const char* label, std::string& text, ImGuiInputTextFlags flags
     return true;
 }
 
+std::optional<std::string> unfinished_text(const char* label) {
+    const ImGuiID id = ImGui::GetCurrentWindow()->GetID(label);
+    const LastField& last = last_field();
+    if (ImGui::GetActiveID() != id || last.id != id || last.taken == last.given) return std::nullopt;
+    return text_of_field(last.taken);
+}
+
 bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGuiInputTextFlags flags) {
     std::string lines = without_returns(text);
     const std::string before = lines;

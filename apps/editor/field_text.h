@@ -7,6 +7,7 @@
 // beyond, for private ones (U+E000 to U+F8FF), which it takes of no keyboard, and for those of this range. There is one
 // table of them, so that texts can be copied between fields; all functions are for the thread that draws.
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -32,6 +33,9 @@ bool input_text(const char* label, std::string& text, const char* hint = nullptr
 // window that opens over it (at the latest in the frame after that, or, where it is not drawn, when it is again); only then
 // `text` is changed, to what was typed. Escape brings back what was there.
 bool input_value(const char* label, std::string& text, ImGuiInputTextFlags flags = 0);
+
+// Returns what was typed into a field of input_value() that still has the caret; nothing where that is what it began with.
+std::optional<std::string> unfinished_text(const char* label);
 
 // As ImGui::InputTextMultiline(), but returns whether the text was changed. Lines keep their ends; what is added has those of
 // the first line.

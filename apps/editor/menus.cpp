@@ -185,8 +185,9 @@ void status_bar(Editor& editor) {
         if (ImGui::Selectable("##problems", false, 0, room)) editor.wanted_tab = 2;
         const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
         const ImVec4 clip(low.x, low.y, high.x, high.y);
+        const ImVec2 at(low.x, 0.5f * (low.y + high.y - ImGui::GetFontSize()));
         // Not as its label, in which `##` has a meaning.
-        ImGui::GetWindowDrawList()->AddText(nullptr, 0, low, ImGui::GetColorU32(red), text.data(),
+        ImGui::GetWindowDrawList()->AddText(nullptr, 0, at, ImGui::GetColorU32(red), text.data(),
                                             text.data() + text.size(), 0, &clip);
         editor.controls.note("problems");
         if (refused) editor.controls.note("refusal");

@@ -85,9 +85,14 @@ void value_row(Editor& editor, const ValueRow& row) {
     }
     tooltip_of_last(hint_of(row).c_str());
     ImGui::TableNextColumn();
-    if (const std::optional<std::string> value = edit_value(editor, row)) {
+    bool unfinished = false;
+    if (const std::optional<std::string> value = edit_value(editor, row, unfinished)) {
         const bool dragging = ImGui::IsItemActive() || ImGui::IsMouseDown(ImGuiMouseButton_Left);
-        if (row.key.name == "name" && row.path.size() > 1 && value->starts_with('"')) {
+        if (unfinished) {
+            editor.unfinished = [path = row.path, typed = *value](const std::string& text) {
+                return with_value(text, path, typed);
+            };
+        } else if (row.key.name == "name" && row.path.size() > 1 && value->starts_with('"')) {
             const Node typed = parsed_value(*value);
             const auto renamed = [&](const std::string& text) {
                 return with_new_name(text, editor.document->values(), row.path, typed.text,

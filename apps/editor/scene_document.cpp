@@ -187,11 +187,11 @@ fs::path SceneDocument::autosave_folder(const fs::path& folder) const {
     return folder_.empty() ? folder : folder_;
 }
 
-void SceneDocument::autosave(const fs::path& folder) {
-    if (!is_modified()) return remove_autosave();
-    if (version_ == autosaved_version_ && autosave_.is_in_place()) return;
-    autosave_.write(autosave_folder(folder), title(), text());
-    autosaved_version_ = version_;
+void SceneDocument::autosave(const fs::path& folder, const std::string& now) {
+    if (now == saved_text_) return remove_autosave();
+    if (now == autosaved_text_ && autosave_.is_in_place()) return;
+    autosave_.write(autosave_folder(folder), title(), now);
+    autosaved_text_ = now;
 }
 
 std::vector<LeftAutosave> SceneDocument::left_autosaves(const fs::path& folder) const {

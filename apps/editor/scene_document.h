@@ -77,8 +77,10 @@ class SceneDocument {
     void reload();
 
     // Writes unsaved edits into a file beside the scene's (autosave.h), in `folder` for one that has none; removes that
-    // file when there are none. Files that are there already stay as they are. Throws Error(io).
-    void autosave(const std::filesystem::path& folder);
+    // file when there are none. Files that are there already stay as they are. `now`: the text, or what it is about to become.
+    // Throws Error(io).
+    void autosave(const std::filesystem::path& folder, const std::string& now);
+    void autosave(const std::filesystem::path& folder) { autosave(folder, text()); }
     void remove_autosave() { autosave_.remove(); }
     // Returns the files of that kind that ended editors left for this scene, with edits that the text does not have, and
     // those that cannot be read; the newest first.
@@ -109,7 +111,8 @@ class SceneDocument {
     std::filesystem::path folder_;         // of one without a file
     std::optional<FileStamp> file_stamp_;  // of the version that saved_text_ is
     AutosaveFile autosave_;
-    std::uint64_t version_ = 0, autosaved_version_ = 0;
+    std::string autosaved_text_;
+    std::uint64_t version_ = 0;
 
     TomlNode tree_;
     Node values_;

@@ -4,6 +4,7 @@
 #define GLFW_INCLUDE_NONE
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <iomanip>
@@ -21,6 +22,7 @@ namespace nephos {
 namespace {
 
 constexpr std::chrono::seconds kPatience{10}, kLongPatience{60};
+constexpr double kMostPixels = 16384;
 
 const std::map<std::string, int>& commands() {  // and how many words follow at least
     static const std::map<std::string, int> known{{"click", 1},
@@ -221,12 +223,14 @@ void Script::begin_line(Editor& editor) {
         lines_.pop_front();
         line_begun_ = false;
     };
-    const auto number = [&](std::size_t n) {
-        try {
-            return std::stod(words[n]);
-        } catch (const std::exception&) {
-            fail("'" + words[n] + "' is no number");
-        }
+    const auto number = [&](std::size_t n, double least = -1e6, double most = 1e6) {
+        double value = 0;
+        const char* const end = words[n].data() + words[n].size();
+        const auto [rest, error] = std::from_chars(words[n].data(), end, value);
+        if (error != std::errc() || rest != end || !(value >= least && value <= most))
+            fail("'" + words[n] + "' is no number from " + number_text(least, 6) + " to " +
+                 number_text(most, 6));
+        return value;
     };
     const auto waited = [&](std::chrono::seconds most, const std::string& for_what) {
         if (Clock::now() - line_begin_ > most) fail("waited too long for " + for_what);
@@ -275,12 +279,12 @@ void Script::begin_line(Editor& editor) {
         press(words[1]);
     } else if (command == "wait") {
         // On a slow machine a short time is less than a frame, and what is waited for needs some.
-        const double seconds = number(1);
+        const double seconds = number(1, 0);
         if (++waited_frames_ < std::min(20.0, 30 * seconds)) return;
         if (std::chrono::duration<double>(Clock::now() - line_begin_).count() < seconds) return;
     } else if (command == "wait-step") {
         waited(kLongPatience, "step " + words[1]);
-        if (!editor.picture || double(editor.picture->step) < number(1)) return;
+        if (!editor.picture || double(editor.picture->step) < number(1, 0, 1e15)) return;
     } else if (command == "wait-picture") {
         waited(kLongPatience, "a picture");
         if (!picture_is_whole(editor)) {
@@ -293,6 +297,7 @@ void Script::begin_line(Editor& editor) {
         editor.capture_to = rest_of(words, 1);
         mouse_ = ImVec2(-1, -1);  // no tooltip in the picture
     } else if (command == "picture") {
+        waited(kLongPatience, "a picture");
         if (!editor.picture) return;
         std::string name = rest_of(words, 1);
         const std::size_t percent = name.find('%');
@@ -307,12 +312,12 @@ void Script::begin_line(Editor& editor) {
     } else if (command == "expect-control") {
         if (!find(editor, rest_of(words, 1), at)) return;
     } else if (command == "resize") {
-        editor.window->set_size(int(number(1)), int(number(2)));
+        editor.window->set_size(int(number(1, 1, kMostPixels)), int(number(2, 1, kMostPixels)));
     } else if (command == "minimise" || command == "restore") {
         editor.window->minimise(command == "minimise");
     } else if (command == "random") {
-        random_left_ = std::uint64_t(number(1));
-        random_.seed(unsigned(number(2)));
+        random_left_ = std::uint64_t(number(1, 0, 1e9));
+        random_.seed(unsigned(number(2, 0, 4294967295.0)));
     } else if (command == "quit") {
         editor.quit = true;
     }

@@ -153,6 +153,9 @@ struct OpenScene {
     bool is_answered = false;                  // at the end of the program: saved or discarded
 };
 
+// Returns a text with an edit made in it.
+using TextEdit = std::function<std::string(const std::string& text)>;
+
 // The base part is the scene that is shown; the others stand in `scenes`, in which its own place is empty
 // (simulations.cpp).
 struct Editor : OpenScene {
@@ -198,6 +201,8 @@ struct Editor : OpenScene {
     std::vector<std::filesystem::path> folder_scenes;
     std::string message;  // in the status bar
     bool message_is_bad = false;
+    TextEdit
+        unfinished;  // what is typed into a field that has the caret, and is kept with the edits; may be empty
     std::chrono::steady_clock::time_point message_time, last_disk_look, last_autosave;
     std::string rates;  // in the status bar, from time to time: one that changes in every frame cannot be read
     std::chrono::steady_clock::time_point rates_time;
@@ -217,9 +222,8 @@ void say(Editor& editor, std::string message, bool is_bad = false);
 // edits.cpp: does something that may throw; what went wrong is said in the status bar. Returns whether it was done.
 bool attempt(Editor& editor, const std::function<void()>& act);
 
-// Changes of the document reach the live scene; `what` names the step for undo. `edit` returns the new text. A change
+// Changes of the document reach the live scene; `what` names the step for undo. A change
 // that fails, and one of a text with a syntax error, in which nothing has its place, is said and changes nothing.
-using TextEdit = std::function<std::string(const std::string& text)>;
 bool change_text(Editor& editor, const TextEdit& edit, const std::string& what,
                  const std::string& merge = {});
 void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging = false,

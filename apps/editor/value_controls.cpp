@@ -211,30 +211,31 @@ float width_before_file_button(const ValueRow& row) {
     return -(ImGui::CalcTextSize("...").x + 2 * style.FramePadding.x + style.ItemInnerSpacing.x);
 }
 
-std::optional<std::string> edit_text(Editor& editor, const ValueRow& row) {
+std::optional<std::string> edit_text(Editor& editor, const ValueRow& row, bool& unfinished) {
     std::string text = row.node != nullptr ? row.node->text : "";
     if (row.node != nullptr && row.node->kind == Node::Kind::integer)
         text = std::to_string(row.node->integer);
     ImGui::BeginGroup();
     ImGui::SetNextItemWidth(width_before_file_button(row));
     const bool typed = input_value("##value", text);
+    const std::optional<std::string> typing = unfinished_text("##value");
     file_choice(editor, row, [](const std::string& name) { return toml_string(name); });
     ImGui::EndGroup();
-    if (!typed) return std::nullopt;
-    if (row.key.kind == KeyKind::seed) {
-        std::uint64_t seed = 0;
-        if (!parse_seed(text, seed)) {
-            say(editor,
-                "\"" + shortened(text) +
-                    "\" is no seed: expected a number from 0 to 18446744073709551615, or 0x and hexadecimal "
-                    "digits",
-                true);
-            return std::nullopt;
-        }
+    unfinished = typing.has_value();
+    if (!typed && !typing) return std::nullopt;
+    if (typing) text = *typing;
+    if (row.key.kind != KeyKind::seed) return toml_string(text);
+    std::uint64_t seed = 0;
+    if (parse_seed(text, seed)) {
         const bool plain = seed <= 0x7fffffffffffffff && !text.starts_with("0x");
         return plain ? std::to_string(seed) : toml_string(text);
     }
-    return toml_string(text);
+    if (typing) return toml_string(text);
+    say(editor,
+        "\"" + shortened(text) +
+            "\" is no seed: expected a number from 0 to 18446744073709551615, or 0x and hexadecimal digits",
+        true);
+    return std::nullopt;
 }
 
 std::optional<std::string> edit_word(Editor& editor, const ValueRow& row) {
@@ -289,7 +290,21 @@ std::vector<std::string> candidates(const Editor& editor, const ValueRow& row) {
     return names;
 }
 
-std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
+// Returns the texts between commas, without blanks around them and without empty ones.
+std::vector<std::string> parts_of_list(const std::string& list) {
+    std::vector<std::string> parts;
+    for (std::size_t at = 0; at <= list.size();) {
+        const std::size_t comma = std::min(list.find(',', at), list.size());
+        const std::size_t first = std::min(list.find_first_not_of(' ', at), comma);
+        std::string part = list.substr(first, comma - first);
+        while (!part.empty() && part.back() == ' ') part.pop_back();
+        if (!part.empty()) parts.push_back(std::move(part));
+        at = comma + 1;
+    }
+    return parts;
+}
+
+std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row, bool& unfinished) {
     std::vector<std::string> texts;
     if (row.node != nullptr && row.node->kind == Node::Kind::text) texts.push_back(row.node->text);
     if (row.node != nullptr) {
@@ -310,6 +325,7 @@ std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
         });
         ImGui::BeginGroup();
         const bool typed = input_value("##value", shown, is_plain ? 0 : ImGuiInputTextFlags_ReadOnly);
+        const std::optional<std::string> typing = unfinished_text("##value");
         if (!is_plain) tooltip_of_last("A text with a comma or blanks around it is edited in Text");
         file_choice(editor, row, [texts, as_toml](const std::string& name) {
             std::vector<std::string> more = texts;
@@ -317,17 +333,9 @@ std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
             return as_toml(more);
         });
         ImGui::EndGroup();
-        if (!typed) return std::nullopt;
-        std::vector<std::string> parts;
-        for (std::size_t at = 0; at <= shown.size();) {
-            const std::size_t comma = std::min(shown.find(',', at), shown.size());
-            const std::size_t first = std::min(shown.find_first_not_of(' ', at), comma);
-            std::string part = shown.substr(first, comma - first);
-            while (!part.empty() && part.back() == ' ') part.pop_back();
-            if (!part.empty()) parts.push_back(std::move(part));
-            at = comma + 1;
-        }
-        return as_toml(parts);
+        unfinished = typing.has_value();
+        if (!typed && !typing) return std::nullopt;
+        return as_toml(parts_of_list(typing.value_or(shown)));
     }
     std::optional<std::string> out;
     if (ImGui::BeginCombo("##value", shown.empty() ? "(none)" : shown.c_str())) {
@@ -351,7 +359,7 @@ std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
 
 }  // namespace
 
-std::optional<std::string> edit_value(Editor& editor, const ValueRow& row) {
+std::optional<std::string> edit_value(Editor& editor, const ValueRow& row, bool& unfinished) {
     switch (row.key.kind) {
         case KeyKind::boolean: {
             bool on = row.node != nullptr && row.node->boolean;
@@ -378,11 +386,11 @@ std::optional<std::string> edit_value(Editor& editor, const ValueRow& row) {
         case KeyKind::boundaries:
             return edit_boundaries(row);
         case KeyKind::texts:
-            return edit_texts(editor, row);
+            return edit_texts(editor, row, unfinished);
         case KeyKind::text:
         case KeyKind::path:
         case KeyKind::seed:
-            return edit_text(editor, row);
+            return edit_text(editor, row, unfinished);
         case KeyKind::table:
         case KeyKind::tables:
             break;

@@ -21,7 +21,8 @@ struct ValueRow {
     bool present;      // in the text
 };
 
-// Draws the control; returns the new value as TOML when the user changed it.
-std::optional<std::string> edit_value(Editor& editor, const ValueRow& row);
+// Draws the control; returns the new value as TOML when the user changed it, or is about to: `unfinished` says that it is a text
+// whose field has the caret yet.
+std::optional<std::string> edit_value(Editor& editor, const ValueRow& row, bool& unfinished);
 
 }  // namespace nephos

@@ -132,8 +132,12 @@ void captions(Editor& editor, const LiveStatus& status) {
                            IM_COL32(120, 180, 245, 230));
     }
     if (!editor.picture) {
+        const bool has_problems = !editor.document->problems().empty();
         list.AddRectFilled(editor.view_min, editor.view_max, IM_COL32(20, 23, 26, 255));
-        write(corner, "Preparing the first picture\u2026", white);
+        write(corner,
+              has_problems ? "No picture: the scene has problems, which the tab Text lists"
+                           : "Preparing the first picture\u2026",
+              white);
         return;
     }
     const int seconds = int(std::lround(editor.picture->time_s));

@@ -65,6 +65,27 @@ int on_lost_display(void*) {
     std::_Exit(int(ErrorCode::gpu));
 }
 
+// An error that the X server answers with, as <X11/Xlib.h> has it.
+struct XError {
+    int type;
+    void* display;
+    unsigned long resource, serial;
+    unsigned char code, request, minor;
+};
+
+unsigned long own_window = 0;  // by its number in the X server
+
+// Xlib would end the program for any of them. A window that is gone is one that another program has destroyed; what else is
+// refused (a selection that another window asked for and closed, say) is no reason to lose edits.
+int on_x_error(void* display, XError* error) {
+    constexpr unsigned char kBadWindow = 3, kBadDrawable = 9;
+    if ((error->code == kBadWindow || error->code == kBadDrawable) && error->resource == own_window)
+        return on_lost_display(display);
+    std::fprintf(stderr, "note: the X server refused a request (error %d of request %d.%d)\n", error->code,
+                 error->request, error->minor);
+    return 0;
+}
+
 // Dots an inch of an X server over 96 where nobody has set Xft.dpi, which is all that GLFW asks for; 1 elsewhere. By
 // name, so that a GLFW for another window system does as well, and X11's headers are not needed.
 float x_server_scale() {
@@ -159,6 +180,11 @@ struct Window::Impl {
         using Handler = int(void*);
         if (const auto set_handler = symbol<Handler*(Handler*)>("XSetIOErrorHandler"))
             set_handler(&on_lost_display);
+        using ErrorHandler = int(void*, XError*);
+        if (const auto number_of = symbol<unsigned long(GLFWwindow*)>("glfwGetX11Window"))
+            own_window = number_of(handle.window);
+        if (const auto set_handler = symbol<ErrorHandler*(ErrorHandler*)>("XSetErrorHandler"))
+            set_handler(&on_x_error);
         glfwSetDropCallback(handle.window, [](GLFWwindow* window, int count, const char** paths) {
             auto& self = *static_cast<Impl*>(glfwGetWindowUserPointer(window));
             for (int n = 0; n < count; ++n) self.dropped.emplace_back(paths[n]);

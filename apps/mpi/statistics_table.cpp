@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "core/text.h"
 
 namespace nephos {
@@ -26,17 +27,14 @@ std::string field(double value) { return std::isfinite(value) ? number_text(valu
 // Returns what an earlier call has left: the table, and levels of a state.
 std::vector<fs::path> earlier_files(const fs::path& folder) {
     std::vector<fs::path> files;
-    std::error_code error;
-    for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-        const std::string name = at->path().filename().string();
+    for (const std::string& name : names_in_folder(folder)) {
         constexpr std::string_view kBegin = "levels_", kEnd = ".vdb";
         bool is_levels = name.starts_with(kBegin) && name.ends_with(kEnd) &&
                          name.size() >= kBegin.size() + 5 + kEnd.size();
         for (std::size_t n = kBegin.size(); is_levels && n < name.size() - kEnd.size(); ++n)
             is_levels = name[n] >= '0' && name[n] <= '9';
-        if (is_levels || name == "statistics.csv") files.push_back(at->path());
+        if (is_levels || name == "statistics.csv") files.push_back(folder / name);
     }
-    if (error) throw Error(ErrorCode::io, folder.string() + ": cannot read the folder: " + error.message());
     return files;
 }
 

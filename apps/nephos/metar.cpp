@@ -150,6 +150,7 @@ int metar(const MetarArguments& a) {
     if (!a.work.quiet)
         for (const std::string& note : fitted.notes) print_note(note);
     if (!a.scene.empty()) write_atomically(a.scene, std::string_view(fitted.text));
+    nlohmann::ordered_json json;
     if (a.work.json) {
         nlohmann::ordered_json layers = nlohmann::ordered_json::array();
         for (const FittedLayer& l : fitted.layers)
@@ -159,8 +160,9 @@ int metar(const MetarArguments& a) {
                               {"cover", l.cover},
                               {"coverage", l.coverage},
                               {"tries", l.tries}});
-        output.line(json_text(
-            {{"report", report.text}, {"scene", a.scene}, {"layers", layers}, {"notes", fitted.notes}}));
+        json = {{"report", report.text}, {"scene", a.scene}, {"layers", layers}, {"notes", fitted.notes}};
+        if (a.scene.empty()) json["text"] = fitted.text;
+        if (!a.run) output.line(json_text(json));
     } else if (a.scene.empty() && !a.run) {
         output.write(fitted.text);
     } else if (!a.work.quiet) {
@@ -185,6 +187,11 @@ int metar(const MetarArguments& a) {
     observer.stop = [] { return pending_signal() != 0; };
     const RunReport result = run_scene(std::move(settings), observer);
     bar.reset();
+    if (a.work.json) {
+        json["run"] = {
+            {"folder", result.folder.string()}, {"frames", result.frames}, {"complete", result.complete}};
+        output.line(json_text(json));
+    }
     if (!a.work.quiet && !a.work.json)
         output.line(fmt::format("{}: {} frames in {}", result.scene, result.frames, result.folder.string()));
     return result.complete ? 0 : 128 + pending_signal();

@@ -16,6 +16,7 @@
 #include "apps/nephos/study_commands.h"
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "simulation/layer_simulation.h"
 
 namespace nephos {
@@ -37,10 +38,9 @@ bool is_empty_file(const std::filesystem::path& path) {
 // Throws Error(usage) for a file of the sweep itself, of which some are empty for a while.
 void require_none_of_sweep(const std::filesystem::path& folder, const std::filesystem::path& out) {
     std::vector<std::filesystem::path> files{folder / "timing.csv"};
+    for (const std::string& name : names_in_folder(folder / "shards"))
+        files.push_back(folder / "shards" / name);
     std::error_code error;
-    for (std::filesystem::directory_iterator at(folder / "shards", error), end; !error && at != end;
-         at.increment(error))
-        files.push_back(at->path());
     for (const std::filesystem::path& file : files)
         if (std::filesystem::equivalent(file, out, error)) require_absent(out, "`nephos report`");
 }

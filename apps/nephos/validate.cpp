@@ -118,7 +118,7 @@ int validate(const ValidateArguments& a) {
             results.push_back({{"file", file}, {"valid", false}, {"error", error.what()}});
         }
     }
-    if (a.work.json && !a.print) output.line(json_text(results));
+    if (a.work.json) output.line(json_text(results));
     return unreadable ? int(ErrorCode::io) : status;
 }
 
@@ -129,8 +129,10 @@ void add_validate_command(CLI::App& app, Action& action) {
     const auto a = std::make_shared<ValidateArguments>();
     command->add_option("SCENE", a->files, "Scene files (TOML)")->required()->type_name("SCENE");
     add_scene_changes(*command, a->scene);
-    command->add_flag("--print", a->print, "Print the scene with every key and default spelled out");
+    CLI::Option* print =
+        command->add_flag("--print", a->print, "Print the scene with every key and default spelled out");
     add_json(*command, a->work);
+    command->get_option("--json")->excludes(print);
     command->footer(
         "Exit status 0: all scenes are valid; 2: at least one is not; 3: at least one cannot be read, or a file that it\n"
         "names.\n"

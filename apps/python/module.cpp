@@ -404,7 +404,9 @@ void end_forked_process_at_once(int status, void* parent) {
     ::_exit(status);
 }
 
-PYBIND11_MODULE(_nephos, module) {
+namespace {
+
+void fill(pybind11::module_& module) {
     ::on_exit(&end_forked_process_at_once, reinterpret_cast<void*>(std::intptr_t(::getpid())));
     nephos::add_error(module);
     nephos::add_scene(module);
@@ -417,4 +419,26 @@ PYBIND11_MODULE(_nephos, module) {
     module.def("_toml_text", &nephos::toml_text, "value"_a,
                "Returns a value as it stands in a scene or a plan.");
     module.def("version", &nephos::version, "Returns the version of nephos.");
+}
+
+pybind11::module_::module_def definition;
+
+}  // namespace
+
+// As PYBIND11_MODULE, which would wait for ever in an interpreter within another: pybind11 asks there for a lock that is held.
+extern "C" PYBIND11_EXPORT PyObject* PyInit__nephos() {
+    if (PyInterpreterState_Get() != PyInterpreterState_Main()) {
+        PyErr_SetString(
+            PyExc_ImportError,
+            "nephos cannot be imported in a subinterpreter: expected the main interpreter of the process");
+        return nullptr;
+    }
+    PYBIND11_CHECK_PYTHON_VERSION
+    PYBIND11_ENSURE_INTERNALS_READY
+    auto module = pybind11::module_::create_extension_module("_nephos", nullptr, &definition);
+    try {
+        fill(module);
+        return module.ptr();
+    }
+    PYBIND11_CATCH_INIT_EXCEPTIONS
 }

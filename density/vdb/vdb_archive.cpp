@@ -40,7 +40,7 @@ std::int64_t size_from_beginning(int fd) {
 }  // namespace
 
 CheckedBuffer::CheckedBuffer(int fd) : FileBuffer(fd, std::ios::in | std::ios::binary) {
-    if (!is_open()) throw std::runtime_error("it cannot be read");
+    if (!is_open()) throw std::runtime_error(std::string("cannot read: ") + std::strerror(errno));
 }
 
 std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {

@@ -13,7 +13,7 @@
 //     grid          type            content
 //     density       float, half     fog volume, 0..1; the two extreme corners are active with value 0
 //     hum act cld   bool            active and true where the bit is 1; on request
-//     vel           vec3s           wind in m/s (east, north, up), in blocks of 8x8x8 that hold density; on request
+//     vel           vec3s           wind in m/s (east, north, up), in all voxels of the box; on request
 //
 // The two corner voxels of `density` make the active bounds, and with them OpenVDB's own `file_bbox_min` and
 // `file_bbox_max`, the same in every file of a sequence, clouds or none. The other grids keep the bounds of

@@ -165,7 +165,7 @@ BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const GridGeometry& geometry)
     return grid;
 }
 
-// The wind at each voxel's centre, in every block of the density grid.
+// The wind at each voxel's centre of the whole box: it blows where no cloud is, too.
 VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geometry) {
     if (content.wind.size() != std::size_t(geometry.voxels.z))
         throw Error(ErrorCode::usage, "a VDB file needs one velocity of the wind a level of voxels");
@@ -175,10 +175,11 @@ VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geo
     auto grid = VectorGrid::create(openvdb::Vec3s(0.0f));
     grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
     openvdb::tree::ValueAccessor<VectorTree> accessor(grid->tree());
-    for (const Block& block : blocks_of(*content.density)) {
-        auto leaf = std::make_unique<VectorLeaf>(block.origin);
+    constexpr int kEdge = 8;
+    const auto add_block = [&](const openvdb::Coord& origin) {
+        auto leaf = std::make_unique<VectorLeaf>(origin);
         for (int n = 0; n < kBlockVoxels; ++n) {
-            const openvdb::Coord voxel = block.origin + openvdb::Coord(n >> 6, n >> 3 & 7, n & 7);
+            const openvdb::Coord voxel = origin + openvdb::Coord(n >> 6, n >> 3 & 7, n & 7);
             if (voxel.x() >= geometry.voxels.x || voxel.y() >= geometry.voxels.y ||
                 voxel.z() >= geometry.voxels.z)
                 continue;
@@ -192,7 +193,10 @@ VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geo
             leaf->setValueOn(openvdb::Index(n), velocity);
         }
         accessor.addLeaf(leaf.release());
-    }
+    };
+    for (int x = 0; x < geometry.voxels.x; x += kEdge)
+        for (int y = 0; y < geometry.voxels.y; y += kEdge)
+            for (int z = 0; z < geometry.voxels.z; z += kEdge) add_block({x, y, z});
     return grid;
 }
 

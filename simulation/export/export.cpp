@@ -14,6 +14,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "core/text.h"
 #include "density/export/containers.h"
 #include "density/grid_names.h"
@@ -103,8 +104,10 @@ bool cuts_values(const ExportOptions& options) {
 // The disk that holds the folder, or will; of an export that goes on, what it has written already is not counted again.
 void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
     std::error_code none;
-    for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
-        const std::uintmax_t size = entry.is_regular_file(none) ? entry.file_size(none) : 0;
+    for (const std::string& name : names_in_folder(folder)) {
+        const std::uintmax_t size = std::filesystem::is_regular_file(folder / name, none)
+                                        ? std::filesystem::file_size(folder / name, none)
+                                        : 0;
         if (size != std::uintmax_t(-1)) bytes -= std::min<std::uint64_t>(bytes, size);
     }
     std::filesystem::path at = std::filesystem::absolute(folder);
@@ -117,6 +120,32 @@ void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
                 fmt::format("{}: the export takes {}, but only {} are free", folder.string(),
                             bytes_text(std::size_t(bytes)), bytes_text(std::size_t(space.available))));
 }
+
+// The winds of files, each of which has its own. It is linear between moments, so that one which stays needs its first and
+// last alone, and one that never changes a single one.
+class WindOfFiles {
+  public:
+    void add(double time_s, std::vector<WindLevel> levels) {
+        if (levels.empty()) levels.push_back({});  // calm
+        const std::size_t n = tables_.size();
+        if (n > 0 && time_s <= tables_.back().time_s) return;
+        if (n > 1 && tables_[n - 1].levels == levels && tables_[n - 2].levels == levels)
+            tables_.back().time_s = time_s;
+        else
+            tables_.push_back({time_s, std::move(levels)});
+    }
+    std::vector<WindTable> take() {
+        const bool stays = std::ranges::all_of(
+            tables_, [&](const WindTable& table) { return table.levels == tables_.front().levels; });
+        if (stays && tables_.size() > 1) tables_.resize(1);
+        if (stays && !tables_.empty() && tables_.front().levels == std::vector<WindLevel>{{}})
+            tables_.clear();
+        return std::move(tables_);
+    }
+
+  private:
+    std::vector<WindTable> tables_;
+};
 
 // Reads the files of sequences, and keeps grids that were read once, as long as they are small.
 class GridReader {
@@ -308,6 +337,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
             ExportSequence& s = sequences[n];
             if (all_formats(options).empty()) break;
             bool stopped = false;
+            WindOfFiles winds;  // those of a run are known
             FramesAtWork work(frames_at_once(options, s),
                               [&](ExportedFrame&& frame) { take(s, figures[n], std::move(frame)); });
             try {
@@ -319,6 +349,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                                 if (loaded.metadata) {
                                     frame.time_s = loaded.metadata->time_s;
                                     frame.utc = utc_at(loaded.metadata->georeference, frame.time_s);
+                                    winds.add(frame.time_s, loaded.metadata->wind);
                                 }
                                 for (const std::string& note : loaded.notes)
                                     notes.push_back(frame.file.string() + ": " + note);
@@ -334,6 +365,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 work.finish_quietly();
                 throw;
             }
+            if (!options.files.empty() || !is_run_folder(options.source)) s.wind = winds.take();
             if (progress && !stopped) progress(done, frames);
             lock.require_in_place();
             if (stopped) {

@@ -11,6 +11,7 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "simulation/checked_json.h"
 #include "simulation/manifest.h"
 #include "simulation/sealed_json.h"
@@ -118,10 +119,9 @@ Json parsed_list(const std::filesystem::path& path) {
 void claim(const std::filesystem::path& folder) {
     std::error_code error;
     std::vector<std::filesystem::path> leftovers;
-    for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
-         at.increment(error)) {
-        if (!published_name(at->path().filename().string()).empty()) {
-            leftovers.push_back(at->path());
+    for (const std::string& name : names_in_folder(folder)) {
+        if (!published_name(name).empty()) {
+            leftovers.push_back(folder / name);
         } else if (!is_export_folder(folder)) {
             throw Error(ErrorCode::usage,
                         folder.string() + ": is not empty and holds no export: choose another folder");

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include "core/atomic_file.h"
@@ -99,6 +100,24 @@ BrickOptions brick_options(const ExportOptions& options, const ExportSequence& s
     return bricks;
 }
 
+// Throws Error(usage) where a value is beyond 16-bit floats, in which it would be infinite.
+void require_halves(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
+                    float largest) {
+    constexpr float kLargestHalf = 65504;
+    for (const ExportFormat format : all_formats(options)) {
+        const bool is_vdb = format == ExportFormat::vdb;
+        const bool halves = is_vdb ? options.type == VoxelType::r16f
+                                   : (is_dense(format) || format == ExportFormat::bricks) &&
+                                         type_of(options, format) == VoxelType::r16f;
+        if (!halves || !(largest > kLargestHalf * (is_vdb ? 1 : s.scale))) continue;
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: its largest value is {:g}, and 16-bit floats end at {:g}: expected --type "
+                        "r32f{}",
+                        frame.file.string(), largest, kLargestHalf, is_vdb ? "" : " or --range auto"));
+    }
+}
+
 }  // namespace
 
 DensityGrid shifted_by_half_a_voxel(const DensityGrid& density) {
@@ -112,6 +131,7 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
     if (!(loaded.density.extent() == s.extent) || !(loaded.density.placement() == s.placement))
         throw Error(ErrorCode::io,
                     frame.file.string() + ": has another box than the first file of its sequence");
+    require_halves(options_, s, frame, loaded.density.max_value());
     const ExportSource source{frame.file, file_digest(frame.file)};
     require_unchanged(frame);
     std::map<VoxelType, EncodedVolume> encoded;

@@ -126,7 +126,6 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, "no file has a number of this range");
     read_first(options, s);
-    if (!s.metadata.wind.empty()) s.wind.push_back({s.metadata.time_s, s.metadata.wind});
     for (SourceFrame& frame : s.frames) frame.time_s = s.metadata.time_s;
     return s;
 }
@@ -228,7 +227,8 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
     };
     if (options.budget_bytes) {
         if (!dense)
-            throw Error(ErrorCode::usage, "--budget counts dense formats: raw, vti, dds, ktx2 or slices");
+            throw Error(ErrorCode::usage,
+                        "--budget counts dense formats: raw, bricks, vti, dds, ktx2 or slices");
         while (frame_bytes() > *options.budget_bytes) {
             const int next = factor_near(s, s.layout.factor + 1, 1);
             if (next == 0) break;

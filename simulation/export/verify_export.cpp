@@ -9,6 +9,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "density/export/bricks.h"
 #include "density/export/cloud_picture.h"
 #include "density/export/containers.h"
@@ -223,8 +224,8 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
         names.insert(file.path);
     }
     std::vector<std::filesystem::path> extra;
-    for (const auto& entry : std::filesystem::directory_iterator(folder))
-        if (!names.contains(entry.path().filename())) extra.push_back(entry.path().filename());
+    for (const std::string& name : names_in_folder(folder))
+        if (!names.contains(name)) extra.emplace_back(name);
     for (Check& check : check_files(folder, files, extra)) result.checks.push_back(std::move(check));
     if (!options.hashes_only) {
         if (std::optional<Check> check = check_sidecars(folder, list))

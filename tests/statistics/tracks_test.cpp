@@ -240,6 +240,12 @@ TEST(Tracks, LifetimesAreThoseOfKaplanAndMeier) {
     EXPECT_DOUBLE_EQ(s.mean, 1 + 0.75 + 0.5 + 0.5);
     EXPECT_DOUBLE_EQ(s.median, 2);
     EXPECT_NEAR(s.mean_error, std::sqrt(1.75 * 1.75 / 12 + 1.0 / 6), 1e-12);
+    // Half of them have died at the age of n / 2, whatever rounding makes of the product.
+    for (std::uint32_t n = 2; n <= 200; n += 2) {
+        std::vector<Track> all;
+        for (std::uint32_t age = 1; age <= n; ++age) all.push_back(track(5, 4 + age, TrackEnd::death));
+        EXPECT_DOUBLE_EQ(track_statistics(all, 0, 1000).median, n / 2) << n;
+    }
     // What begins or ends outside the steps, or at an open side, says less or nothing.
     tracks.push_back({.first = 0, .last = 9, .end = TrackEnd::death});  // there before
     tracks.push_back({.first = 4, .last = 6, .cut = 4, .begin = TrackBegin::entered, .end = TrackEnd::death});

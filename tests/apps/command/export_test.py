@@ -153,6 +153,37 @@ class Export(Case):
             self.assertAlmostEqual(a - half, b)
         self.assertAlmostEqual(next(after[1].citerOnValues()).value[0], 7, 5)
         self.assertIn("Half a voxel", (self.folder / "blender/README.txt").read_text())
+        self.assertEqual(after[1].activeVoxelCount(), 32 * 24 * 12)  # it blows where no cloud is, too
+
+    def test_winds_of_files_are_those_of_each(self):
+        """Files of a run in which the wind turns, exported by themselves, and a calm one among them."""
+        turning = SCENE + "".join(f"[[wind]]\ntime_s = {time}\nlevels = [{{ height_m = 0, from_deg = {turn}, speed_m_per_s = {speed} }}]\n"
+                                  for time, turn, speed in ((0, 270, 5), (1000, 180, 9)))
+        self.call("run", self.write("turning.toml", turning), "--no-render", "--out", "turning")
+        self.call("export", *sorted((self.folder / "turning/density").glob("*.vdb")), "--to", "raw", "-o", "files")
+        self.call("export", "turning", "--to", "raw", "-o", "whole")
+        winds, of_run = (json.loads((self.folder / out / "turning.volume.json").read_text())["wind"] for out in ("files", "whole"))
+        frames = json.loads((self.folder / "files/turning.volume.json").read_text())["frames"]
+        self.assertEqual([wind["time_s"] for wind in winds], [frame["time_s"] for frame in frames])
+        self.assertEqual([wind["time_s"] for wind in of_run], [0, 1000])
+        for wind in winds:  # linear between those of the run
+            level, = wind["levels"]
+            self.assertAlmostEqual(level["east_m_per_s"], 5 * (1 - wind["time_s"] / 1000), 5)
+            self.assertAlmostEqual(level["north_m_per_s"], 9 * wind["time_s"] / 1000, 5)
+        self.call("export", *sorted((self.folder / "run/density").glob("*.vdb")), "--to", "raw", "-o", "calm")
+        self.assertEqual(json.loads(next((self.folder / "calm").glob("*.volume.json")).read_text())["wind"], [])
+
+    def test_values_beyond_16_bits_are_refused(self):
+        import pyopenvdb
+        grid = pyopenvdb.FloatGrid()
+        grid.copyFromArray(numpy.linspace(0, 1e5, 1000, dtype="f4").reshape(10, 10, 10))
+        grid.name = "density"
+        pyopenvdb.write(str(self.folder / "large.vdb"), [grid])
+        for arguments in (["--for", "unreal"], ["--to", "raw", "--type", "r16f"], ["--to", "vdb", "--type", "r16f"]):
+            self.refused(2, "export", "large.vdb", *arguments, "-o", "large", says="large.vdb: its largest value is 100000, and 16-bit floats end at 65504")
+            shutil.rmtree(self.folder / "large", ignore_errors=True)
+        self.call("export", "large.vdb", "--to", "raw", "--type", "r16f", "--range", "auto", "-o", "large")
+        self.call("verify", "large")
 
     def test_sidecar_keeps_its_schema_and_the_example_reads_it(self):
         import jsonschema

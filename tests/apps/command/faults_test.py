@@ -258,6 +258,24 @@ class Faults(Case):
         self.assertFalse((self.folder / "sweep").exists())
         self.no_leftovers("moved")
 
+    def test_a_folder_that_cannot_be_listed_is_not_empty(self):
+        """Files that no run wrote stay, and extra ones are not called none, whichever opening of their folder fails."""
+        mine = self.folder / "out/density/tiny_0001.vdb"
+        mine.parent.mkdir(parents=True)
+        mine.write_bytes(b"MINE")
+        failed = 0
+        for number in range(1, 6):
+            result = self.run_into("out", env=self.failing(f"open EIO {number} 1", "out/density"))
+            self.assertIn(result.returncode, (2, 3), result.stderr)
+            failed += result.returncode == 3
+            self.assertEqual(mine.read_bytes(), b"MINE", number)
+        self.assertGreater(failed, 0)
+        self.assertEqual(self.run_into("run").returncode, 0)
+        shutil.copy(self.folder / "run/density/tiny_0002.vdb", self.folder / "run/density/tiny_0099.vdb")
+        self.assertIn("tiny_0099.vdb is listed nowhere", self.call("verify", "run", status=1).stdout)
+        result = self.call("verify", "run", status=3, env=self.failing("open EIO 1 1", "run/density"))
+        self.assertIn("none  listing   run/density: cannot read: Input/output error", result.stdout)
+
     def test_rows_are_not_appended_to_what_a_link_leads_to(self):
         process = self.started("out")
         process.send_signal(signal.SIGINT)

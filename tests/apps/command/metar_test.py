@@ -116,6 +116,8 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
         self.assertIn("report.txt: `" + "X" * 60 + "...`: expected", said)
         self.assertLess(len(said), 300)
         self.assertIn("left out", self.call("metar", "EGLL 211350Z 24012KT 9999 FEWO20", "--lenient", "--explain").stderr)
+        text = json.loads(self.call("metar", REAL[0], "--json").stdout)["text"]
+        self.assertEqual(text, self.call("metar", REAL[0]).stdout)
         for option in (("--out", "run"), ("--no-render",), ("--resume",), ("--overwrite",)):
             self.assertIn("--run", self.call("metar", REAL[0], *option, status=2).stderr)
         for explain in ((), ("--explain",)):

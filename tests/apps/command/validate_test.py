@@ -58,6 +58,7 @@ apron_cells = 0
         self.assertNotIn("note:", quiet.stderr)
 
     def test_the_printed_scene_is_the_scene(self):
+        self.refused(2, "validate", self.scene, "--print", "--json", says="--print")
         text = self.call("validate", self.scene, "--print").stdout
         self.write("again/tiny.toml", text)
         hashes = [json.loads(self.call("validate", p, "--json").stdout)[0]["scene_hash"]

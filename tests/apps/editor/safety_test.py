@@ -3,6 +3,7 @@
 """What a user must not lose: edits through errors, files that are there already, the window's layout. And the size of
 everything on a display with small dots. See case.py."""
 
+import ctypes
 import os
 import signal
 import subprocess
@@ -368,6 +369,66 @@ class Safety(Case):
         self.assertEqual(editor.returncode, 4, said)
         self.assertIn("the display is gone; unsaved edits are kept", said)
         self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
+
+    def test_a_window_that_another_program_destroys_keeps_the_edits(self):
+        scene = self.models()
+        script = self.folder / "script.txt"
+        script.write_text("wait-step 1\nclick sun\nset sun.elevation_deg 21\nwait 0.3\nhashes ready.txt\nwait 100\n", encoding="utf-8")
+        screen = Screen()
+        self.addCleanup(screen.close)
+        editor = subprocess.Popen([NEPHOS, "edit", str(scene), "--size", "1280x800", "--script", str(script)], cwd=self.folder,
+                                  env={**self.environment, "DISPLAY": screen.display}, stderr=subprocess.PIPE, text=True)
+        self.wait_for(self.folder / "ready.txt", editor)
+        x11 = ctypes.CDLL("libX11.so.6")
+        x11.XOpenDisplay.restype = ctypes.c_void_p
+        display = ctypes.c_void_p(x11.XOpenDisplay(screen.display.encode()))
+        x11.XDefaultRootWindow.restype = ctypes.c_ulong
+        root, parent, windows, count = ctypes.c_ulong(), ctypes.c_ulong(), ctypes.POINTER(ctypes.c_ulong)(), ctypes.c_uint()
+        x11.XQueryTree(display, ctypes.c_ulong(x11.XDefaultRootWindow(display)), ctypes.byref(root), ctypes.byref(parent),
+                       ctypes.byref(windows), ctypes.byref(count))
+        for n in range(count.value):
+            x11.XDestroyWindow(display, ctypes.c_ulong(windows[n]))
+        x11.XCloseDisplay(display)
+        _, said = editor.communicate(timeout=60)
+        self.assertEqual(editor.returncode, 4, said)
+        self.assertIn("the display is gone; unsaved edits are kept", said)
+        self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
+
+    def test_what_is_being_typed_is_kept(self):
+        """In a field that still has the caret: every five seconds, and by a signal."""
+        scene = self.folder / "t.toml"
+        text = 'name = "models"\nseed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n'
+        scene.write_text(text, encoding="utf-8")
+        script, ready, autosave = self.folder / "script.txt", self.folder / "ready.txt", self.folder / ".t.toml.autosave"
+        for key, typed, kept in (("name", "xyz", text.replace("models", "modelsxyz")), ("seed", "56", text.replace("= 4", "= 456")),
+                                 ("seed", "x", text.replace("= 4", '= "4x"'))):
+            for end in (signal.SIGTERM, signal.SIGKILL):
+                script.write_text(f"wait-step 1\nclick scene\nwait 0.2\nclick {key}\nkey END\ntype {typed}\nwait 0.3\nhashes ready.txt\nwait 100\n",
+                                  encoding="utf-8")
+                command = self.command(scene, "--script", script)
+                editor = subprocess.Popen(command, cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+                self.wait_for(ready, editor)
+                if end == signal.SIGKILL:
+                    self.wait_for(autosave, editor)
+                editor.send_signal(end)
+                editor.communicate(timeout=60)
+                self.assertEqual(autosave.read_text(encoding="utf-8"), kept)
+                autosave.unlink()
+                ready.unlink()
+
+    def test_a_picture_of_a_scene_with_problems(self):
+        """The window with what is wrong, and status 2 or 3; a script does not wait for a picture for ever."""
+        for text, status, says in (("[sun]\nelevation_deg = 95\n", 2, "`sun.elevation_deg` is 95, too large"),
+                                   ('[lattice]\ncells = [8, 8, 8]\ncell_size_m = 100\ninitial_state = "none.vdb"\n', 3, "none.vdb: No such file")):
+            scene = self.folder / "p.toml"
+            scene.write_text(text, encoding="utf-8")
+            said = self.edit(scene, "--screenshot", "window.png", "--after", "1", status=status, timeout=120)
+            self.assertIn(says, said)
+            self.assertEqual(self.image("window.png").size, (1280, 800))
+        self.assertIn("script.txt:1: waited too long for a picture", self.edit(scene, script="picture y.png\n", status=1, timeout=180))
+        for line, says in (("random -5 1", "'-5' is no number from 0 to"), ("wait 0.1x", "'0.1x' is no number"), ("resize nan 9", "'nan' is no number"),
+                           ("resize 100 1e30", "'1e30' is no number from 1 to 16384"), ("wait -1", "'-1' is no number")):
+            self.assertIn(f"script.txt:1: {says}", self.edit(scene, script=line + "\n", status=1, timeout=120))
 
     def test_every_new_element_is_valid(self):
         """What a `+` of the outline writes needs no hand in the text."""

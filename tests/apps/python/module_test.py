@@ -34,6 +34,12 @@ def number(text):
 
 
 class Scenes(Case):
+    def test_another_interpreter_is_refused(self):
+        """pybind11 would wait for ever there."""
+        code = "import _xxsubinterpreters as other\nother.run_string(other.create(), 'import nephos')"
+        result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+        self.assertIn("nephos cannot be imported in a subinterpreter", result.stderr)
+
     def test_keys_are_set_on_a_copy(self):
         scene = nephos.Scene(self.scene)
         changed = scene.set("field.background.ext", 0.5).set("lattice.cells", numpy.array([40, 24, 12])).set("seed", 9)
