@@ -204,6 +204,7 @@ void draw_interface(Editor& editor) {
     menu_bar(editor);
     layout(editor, scale);
     dialogs(editor);
+    finish_recorded_value(editor);
     // What is dragged, or typed into one field, is one step.
     if (!ImGui::IsAnyMouseDown() && !ImGui::IsAnyItemActive()) editor.document->end_merging();
 }
@@ -257,6 +258,7 @@ int loop(Editor& editor, Report& report) {
         }
         finish_field_first();
         ImGui::NewFrame();
+        move_caret_on();
         const ImGuiIO& io = ImGui::GetIO();
         if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0 || io.MouseWheel != 0 || ImGui::IsAnyItemActive()) {
             last_input = Clock::now();
@@ -352,9 +354,10 @@ void say(Editor& editor, std::string message, bool is_bad) {
     // Ctrl+S leaves a field first, whose text may be refused: what is saved is told behind that.
     const bool just_refused =
         editor.message_is_bad && Clock::now() - editor.message_time < std::chrono::seconds(1);
-    const bool goes_on = just_refused && !is_bad;
+    const bool goes_on = just_refused && !is_bad && !editor.message_goes_on;
     editor.message = goes_on ? editor.message + " - " + message : std::move(message);
     editor.message_is_bad = is_bad || goes_on;
+    editor.message_goes_on = goes_on;
     editor.message_time = Clock::now();
 }
 
@@ -437,7 +440,10 @@ int run_editor(const EditorOptions& options) {
     if (!failure.empty()) throw Error(ErrorCode::io, failure);
     if (!options.screenshot.empty() && !editor.picture) {
         if (!editor.document->problems().empty()) throw SceneErrors(editor.document->problems());
-        throw Error(ErrorCode::io, editor.live->status().failure);
+        const std::string failed = editor.live->status().failure;
+        throw Error(ErrorCode::io, failed.empty() ? options.screenshot.string() +
+                                                        ": no picture was made: the window was closed before"
+                                                  : failed);
     }
     const std::vector<std::string> messages = editor.window->validation_messages();
     for (const std::string& message : messages) fmt::print(stderr, "validation: {}\n", message);

@@ -5,6 +5,8 @@
 #include <exception>
 #include <utility>
 
+#include <imgui.h>
+
 #include "apps/editor/state.h"
 
 namespace nephos {
@@ -30,7 +32,26 @@ bool change_text(Editor& editor, const TextEdit& edit, const std::string& what, 
 
 void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging,
                NumberForm form) {
+    const bool is_at_work =
+        ImGui::IsAnyItemActive() || (editor.recorded_value && editor.recorded_value->path == path);
+    if (is_recorded(editor, path) && is_of_wind(path) && is_at_work) {
+        editor.recorded_value = {path, value};
+        return;
+    }
     set_values(editor, TextPath(path.begin(), path.end() - 1), {{path.back().name, value}}, dragging, form);
+}
+
+void finish_recorded_value(Editor& editor) {
+    if (!editor.recorded_value || ImGui::IsAnyItemActive()) return;
+    const Editor::RecordedValue done = *std::exchange(editor.recorded_value, std::nullopt);
+    bool is_other = false;  // not where Escape gave back what it was
+    attempt(editor, [&] {
+        const std::string& text = editor.document->text();
+        is_other = with_value(text, done.path, done.value) != text;
+    });
+    if (is_other)
+        set_values(editor, TextPath(done.path.begin(), done.path.end() - 1),
+                   {{done.path.back().name, done.value}});
 }
 
 void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging,

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <map>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include <imgui_internal.h>
@@ -169,15 +170,21 @@ bool edited(const char* label, std::string& text, const Show& show) {
 
 // Input that waits for a field to be finished, frame by frame:
 //
-//     Enter is pressed  -->  released, what waits is pressed  -->  released  (-->  Tab once more)
-enum class Waiting { none, enter_is_pressed, to_be_passed_on, passed_on };
+//     Enter is pressed  -->  released, what waits is pressed  -->  released  -->  the caret has come, after Tab
+//
+// Without a field that has the caret ImGui takes Tab for the first field of all, so that it is not pressed: move_caret_on() asks
+// for the one behind.
+enum class Waiting { none, enter_is_pressed, to_be_passed_on, passed_on, caret_to_come };
 
 struct HeldInput {
     Waiting stage = Waiting::none;
     std::array<bool, 3> buttons{};
     int key = -1;
     bool ctrl = false, shift = false;
-    bool again = false;  // Tab: the first one gives a field that was finished the caret back
+    ImGuiID left = 0;            // the field that Tab leaves for the one behind
+    bool moves_on = false;       // in the frame that begins
+    int frames = 0;              // in which the caret may come yet
+    std::vector<ImWchar> typed;  // meanwhile: it is for where the caret then is
 };
 
 // Fields in which Enter does something else: a line more, or what a dialog is there for.
@@ -240,12 +247,18 @@ bool press_enter_in_field() {
 
 namespace {
 
+constexpr int kFramesOfCaret = 5;
+
 // Presses what has waited.
 void pass_on(HeldInput& held, ImGuiIO& io) {
     io.KeysDown[io.KeyMap[ImGuiKey_Enter]] = false;
     for (std::size_t button = 0; button < held.buttons.size(); ++button)
         if (held.buttons[button]) io.MouseDown[button] = true;
     held.buttons = {};
+    if (held.left != 0) {
+        held.moves_on = true;
+        return;
+    }
     if (held.key < 0) return;
     io.KeysDown[held.key] = true;
     io.KeyCtrl = held.ctrl;
@@ -264,7 +277,7 @@ void hold_back(HeldInput& held, ImGuiIO& io) {
         if (io.KeyCtrl && is_new(key)) found.key = key;
     if (const int tab = io.KeyMap[ImGuiKey_Tab]; tab >= 0 && !io.KeyCtrl && is_new(tab)) {
         found.key = tab;
-        found.again = !io.KeyShift;
+        found.left = io.KeyShift ? 0 : g.ActiveId;
     }
     const bool is_click = std::ranges::count(found.buttons, true) > 0;
     if ((!is_click && found.key < 0) || !press_enter_in_field()) return;
@@ -285,6 +298,10 @@ void hold_back(HeldInput& held, ImGuiIO& io) {
 void finish_field_first() {
     ImGuiIO& io = ImGui::GetIO();
     HeldInput& held = held_input();
+    if (held.stage != Waiting::none) {
+        held.typed.insert(held.typed.end(), io.InputQueueCharacters.begin(), io.InputQueueCharacters.end());
+        io.InputQueueCharacters.resize(0);
+    }
     switch (held.stage) {
         case Waiting::none:
             hold_back(held, io);
@@ -298,12 +315,31 @@ void finish_field_first() {
             break;
         case Waiting::passed_on:
             if (held.key >= 0) io.KeysDown[held.key] = false;
-            held.stage = held.again ? Waiting::to_be_passed_on : Waiting::none;
-            if (!held.again) held = {};
-            held.again = false;
+            held.stage = held.left != 0 ? Waiting::caret_to_come : Waiting::none;
+            held.frames = kFramesOfCaret;
+            break;
+        case Waiting::caret_to_come: {
+            const ImGuiID active = ImGui::GetCurrentContext()->ActiveId;
+            if ((active != 0 && active != held.left) || --held.frames == 0) held.stage = Waiting::none;
+        }
+    }
+    if (held.stage == Waiting::none) {
+        for (const ImWchar c : held.typed) io.InputQueueCharacters.push_back(c);
+        held = {};
     }
     ImGuiContext& g = *ImGui::GetCurrentContext();
     if (g.InputTextState.ID != 0 && g.ActiveId != g.InputTextState.ID) g.InputTextState.ID = 0;
+}
+
+void move_caret_on() {
+    HeldInput& held = held_input();
+    if (!std::exchange(held.moves_on, false)) return;
+    ImGuiContext& g = *ImGui::GetCurrentContext();
+    g.NavId = held.left;
+    ImGui::NavMoveRequestSubmit(ImGuiDir_None, ImGuiDir_Down, ImGuiNavMoveFlags_Tabbing,
+                                ImGuiScrollFlags_None);
+    g.NavTabbingDir = 1;
+    g.NavTabbingCounter = 0;
 }
 
 bool input_text(const char* label, std::string& text, const char* hint, ImGuiInputTextFlags flags) {

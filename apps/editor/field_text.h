@@ -46,6 +46,9 @@ bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGui
 // which Enter is pressed. And a field that was left forgets its way back, which is of a text that may not have been taken.
 void finish_field_first();
 
+// To be called right after ImGui::NewFrame(): gives the caret to the field behind the one that Tab has left.
+void move_caret_on();
+
 // Presses Enter, for one frame, in a field of one line that has the caret; returns whether there is one.
 bool press_enter_in_field();
 

@@ -29,8 +29,18 @@ TextPath with(const TextPath& path, const char* name) {
 
 std::string number_of(const Editor& editor, double metres) { return number_text(tidy_m(editor, metres), 9); }
 
-std::string vector_toml(const Editor& editor, const Vec3& v) {
-    return "[" + number_of(editor, v.x) + ", " + number_of(editor, v.y) + ", " + number_of(editor, v.z) + "]";
+// What a handle makes of a vector: it moves one of its numbers, and the others keep their digits.
+struct Moved {
+    Vec3 value{};
+    int axis = 0;
+};
+
+std::string vector_toml(const Editor& editor, const Moved& moved) {
+    std::string text;
+    for (int axis = 0; axis < 3; ++axis)
+        text += (axis > 0 ? ", " : "[") +
+                (axis == moved.axis ? number_of(editor, moved.value[axis]) : number_text(moved.value[axis]));
+    return text + "]";
 }
 
 void drag_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries) {
@@ -42,29 +52,29 @@ constexpr const char* kMoves[3] = {"move east", "move north", "move up"};
 constexpr const char* kSizes[3] = {"size x", "size y", "size z"};
 
 // Handles of a place; returns the new one while one of them is held.
-std::optional<Vec3> place_handles(Editor& editor, const Vec3& origin, const Vec3& place, double arrow_m,
-                                  int axes = 3) {
-    std::optional<Vec3> out;
+std::optional<Moved> place_handles(Editor& editor, const Vec3& origin, const Vec3& place, double arrow_m,
+                                   int axes = 3) {
+    std::optional<Moved> out;
     for (int axis = 0; axis < axes; ++axis) {
         const auto moved = axis_handle(editor, kMoves[axis], origin + place, kUnits[axis], arrow_m,
                                        kAxisColours[axis], place[axis]);
         if (!moved) continue;
-        out = place;
-        (*out)[axis] = *moved;
+        out = Moved{place, axis};
+        out->value[axis] = *moved;
     }
     return out;
 }
 
 // Handles of half the size along axes that are turned; on their negative sides.
-std::optional<Vec3> size_handles(Editor& editor, const Vec3& centre, const Vec3& half, double yaw_deg,
-                                 int axes = 3) {
-    std::optional<Vec3> out;
+std::optional<Moved> size_handles(Editor& editor, const Vec3& centre, const Vec3& half, double yaw_deg,
+                                  int axes = 3) {
+    std::optional<Moved> out;
     for (int axis = 0; axis < axes; ++axis) {
         const auto size = axis_handle(editor, kSizes[axis], centre, turned(-1.0 * kUnits[axis], yaw_deg),
                                       half[axis], kYellow, half[axis]);
         if (!size) continue;
-        out = half;
-        (*out)[axis] = std::max(*size, 1.0);
+        out = Moved{half, axis};
+        out->value[axis] = std::max(*size, 1.0);
     }
     return out;
 }
@@ -86,7 +96,8 @@ void shape_handles(Editor& editor, const TextPath& table, const char* place_key,
         drag_values(editor, table, {{place_key, vector_toml(editor, *moved)}});
     const bool whole = std::string_view(size_key) == "size_m";
     if (const auto size = size_handles(editor, origin + place, half, yaw_deg.value_or(0)))
-        drag_values(editor, table, {{size_key, vector_toml(editor, whole ? 2.0 * *size : *size)}});
+        drag_values(editor, table,
+                    {{size_key, vector_toml(editor, {(whole ? 2.0 : 1.0) * size->value, size->axis})}});
     if (!yaw_deg) return;
     if (const auto yaw = turn_handle(editor, origin + place, 1.3 * std::max(half.x, half.y), *yaw_deg))
         drag_values(editor, table, {{"yaw_deg", number_text(*yaw)}});
@@ -188,10 +199,12 @@ void placed_rain(Editor& editor, std::size_t layer, const LayerOptions& options)
         const TextPath path = text_path("layer[" + std::to_string(layer) + "].rain.placed[" + std::to_string(n) + "]");
         const Vec3 half{rain.semi_a_m, rain.semi_b_m, 0};
         if (const auto at = place_handles(editor, {}, centre, 0.6 * std::max(half.x, half.y), 2))
-            drag_values(editor, path, {{"x_m", number_of(editor, at->x)}, {"y_m", number_of(editor, at->y)}});
-        if (const auto size = size_handles(editor, centre, half, rain.yaw_deg, 2))
             drag_values(editor, path,
-                       {{"semi_a_m", number_of(editor, size->x)}, {"semi_b_m", number_of(editor, size->y)}});
+                        {{at->axis == 0 ? "x_m" : "y_m", number_of(editor, at->value[at->axis])}});
+        if (const auto size = size_handles(editor, centre, half, rain.yaw_deg, 2))
+            drag_values(
+                editor, path,
+                {{size->axis == 0 ? "semi_a_m" : "semi_b_m", number_of(editor, size->value[size->axis])}});
         if (const auto yaw = turn_handle(editor, centre, 1.3 * std::max(half.x, half.y), rain.yaw_deg))
             drag_values(editor, path, {{"yaw_deg", number_text(*yaw)}});
     }
@@ -206,15 +219,19 @@ void scatter_gizmo(Editor& editor, const TextPath& path, const EllipsoidScatter&
     box_lines(editor, low, high, orange);
     ellipsoid_lines(editor, centre,
                     {scatter.semi_axis_x_m.max, scatter.semi_axis_y_m.max, scatter.semi_axis_z_m.max}, 0, orange);
-    std::optional<Vec3> place = place_handles(editor, {}, centre, 0.4 * std::max(half.x, half.y)), size;
+    const std::optional<Moved> place = place_handles(editor, {}, centre, 0.4 * std::max(half.x, half.y));
+    std::optional<Moved> size;
     if (!place) size = size_handles(editor, centre, glm::max(half, Vec3{1, 1, 1}), 0);
     if (!place && !size) return;
-    const Vec3 at = place.value_or(centre), reach = size.value_or(half);
-    const auto range = [&](int axis) {
-        if (reach[axis] <= 1 && !size) return number_of(editor, at[axis]);  // flat, as it was
-        return "[" + number_of(editor, at[axis] - reach[axis]) + ", " + number_of(editor, at[axis] + reach[axis]) + "]";
-    };
-    drag_values(editor, path, {{"x_m", range(0)}, {"y_m", range(1)}, {"z_m", range(2)}});
+    constexpr const char* kRanges[3] = {"x_m", "y_m", "z_m"};
+    const int axis = place ? place->axis : size->axis;
+    const double at = place ? place->value[axis] : centre[axis],
+                 reach = size ? size->value[axis] : half[axis];
+    const std::string range =
+        reach <= 1 && !size  // flat, as it was
+            ? number_of(editor, at)
+            : "[" + number_of(editor, at - reach) + ", " + number_of(editor, at + reach) + "]";
+    drag_values(editor, path, {{kRanges[axis], range}});
 }
 
 }  // namespace

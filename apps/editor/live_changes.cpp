@@ -240,7 +240,13 @@ Sun sun_now(const Editor& editor) {
                         double(shown_step(editor)) * editor.shown_scene->automaton.time_step_s);
 }
 
+bool is_of_wind(const TextPath& path) {
+    const std::size_t length = wind_length(path);
+    return length > 0 && path.size() > length + 1 && path.back().name != "time_s";
+}
+
 std::optional<std::string> value_now(const Editor& editor, const TextPath& path) {
+    if (editor.recorded_value && editor.recorded_value->path == path) return editor.recorded_value->value;
     if (!is_sun(path) || !editor.shown_scene || editor.shown_scene->sun_path.empty()) return std::nullopt;
     const Sun sun = sun_now(editor);
     if (path[1].name == "colour") return colour_toml(sun.colour);
@@ -280,8 +286,8 @@ bool record_live(Editor& editor, const TextPath& path, const std::string& edited
         record_sun(editor, key);
         return true;
     }
-    const std::size_t length = wind_length(path);
-    if (length > 0 && path.size() > length + 1 && path.back().name != "time_s") {
+    if (is_of_wind(path)) {
+        const std::size_t length = wind_length(path);
         return record_wind(editor, TextPath(path.begin(), path.begin() + std::ptrdiff_t(length)), path,
                            edited);
     }

@@ -50,9 +50,10 @@ const Node* default_node(Editor& editor, const Key& key, const TextPath& path) {
     return made.kind == Node::Kind::table ? nullptr : &made;
 }
 
-// The names of models that the scene has from files.
+// The names of models that the scene has from files; none while the text has problems, as the scene is then of an earlier one.
 std::vector<std::string> names_from_files(const Editor& editor) {
     std::vector<std::string> names;
+    if (!editor.document->problems().empty()) return names;
     for (std::size_t n = 0; n < models_from_files(editor); ++n)
         names.push_back(editor.document->scene()->models[n].name);
     return names;

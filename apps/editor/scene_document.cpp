@@ -207,6 +207,7 @@ void SceneDocument::take_autosave(const LeftAutosave& left) {
     const std::string text = read_file(left.path).text;  // nobody else writes it now
     autosave_.remove();
     autosave_ = std::move(taken);
+    autosaved_text_ = text;
     edit(text, "Recover");
 }
 

@@ -200,9 +200,16 @@ struct Editor : OpenScene {
     bool show_shortcuts = false, show_about = false, show_run = false;
     std::vector<std::filesystem::path> folder_scenes;
     std::string message;  // in the status bar
-    bool message_is_bad = false;
-    TextEdit
-        unfinished;  // what is typed into a field that has the caret, and is kept with the edits; may be empty
+    bool message_is_bad = false, message_goes_on = false;  // behind what was refused
+    // What is typed into a field that has the caret, and is kept with the edits; may be empty.
+    TextEdit unfinished;
+    // A number of a wind that is recorded, as long as its field has the mouse or the caret: a key frame takes its place when it is
+    // recorded, and the field goes with it.
+    struct RecordedValue {
+        TextPath path;
+        std::string value;
+    };
+    std::optional<RecordedValue> recorded_value;
     std::chrono::steady_clock::time_point message_time, last_disk_look, last_autosave;
     std::string rates;  // in the status bar, from time to time: one that changes in every frame cannot be read
     std::chrono::steady_clock::time_point rates_time;
@@ -228,6 +235,8 @@ bool change_text(Editor& editor, const TextEdit& edit, const std::string& what,
                  const std::string& merge = {});
 void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging = false,
                NumberForm form = NumberForm::any);
+// Applies a wind that was typed or dragged while it is recorded, once its field is left.
+void finish_recorded_value(Editor& editor);
 // Several keys of a table as one step of the history.
 void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries,
                 bool dragging = false, NumberForm form = NumberForm::any);
@@ -342,6 +351,8 @@ bool record_live(Editor& editor, const TextPath& path, const std::string& edited
 // Returns whether a change of a key is to be recorded: while the user records, and always of a sun with key frames, which
 // stand in the place of the key.
 bool is_recorded(const Editor& editor, const TextPath& path);
+// Returns whether a path leads to a number of a wind's key frame, other than its time.
+bool is_of_wind(const TextPath& path);
 // Returns the value of a key that key frames stand for, at the step that is shown; nothing for other keys.
 std::optional<std::string> value_now(const Editor& editor, const TextPath& path);
 // Moves the sun: from the present step on when that is_recorded(), otherwise for good.

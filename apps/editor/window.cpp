@@ -81,6 +81,8 @@ int on_x_error(void* display, XError* error) {
     constexpr unsigned char kBadWindow = 3, kBadDrawable = 9;
     if ((error->code == kBadWindow || error->code == kBadDrawable) && error->resource == own_window)
         return on_lost_display(display);
+    static bool is_told = false;  // one may come with each frame
+    if (std::exchange(is_told, true)) return 0;
     std::fprintf(stderr, "note: the X server refused a request (error %d of request %d.%d)\n", error->code,
                  error->request, error->minor);
     return 0;

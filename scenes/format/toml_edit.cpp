@@ -217,14 +217,18 @@ bool is_same_number(std::string_view a, std::string_view b) {
     return first && first == number_of(b) && std::signbit(*first) == std::signbit(*number_of(b));
 }
 
+// Returns whether what a key or an item has is left where it is set to `by`.
+bool stays(std::string_view was, std::string_view by, NumberForm form) {
+    const bool may_stay = form == NumberForm::any || was.find_first_of(".eEnf") == kNone;
+    return may_stay && is_same_number(was, by);
+}
+
 std::vector<Change> replaced_value(std::string_view text, const TomlNode& node, std::string_view value,
                                    NumberForm form) {
-    const auto stays = [&](const TextRegion& region, std::string_view by) {
-        const std::string_view was = text.substr(region.begin, region.end - region.begin);
-        const bool may_stay = form == NumberForm::any || was.find_first_of(".eEnf") == kNone;
-        return may_stay && is_same_number(was, by);
+    const auto text_of = [&](const TextRegion& region) {
+        return text.substr(region.begin, region.end - region.begin);
     };
-    if (node.form == Form::value && stays(node.value, value)) return {};
+    if (node.form == Form::value && stays(text_of(node.value), value, form)) return {};
     if (node.form != Form::array || !value.starts_with('[')) return {{node.value, std::string(value)}};
     const std::string whole = "v = " + std::string(value);
     const TomlNode parsed = toml_tree(whole);
@@ -234,7 +238,7 @@ std::vector<Change> replaced_value(std::string_view text, const TomlNode& node, 
     for (std::size_t n = 0; n < items.size(); ++n) {
         const TextRegion was = node.items[n].value, now = items[n].value;
         const std::string by = whole.substr(now.begin, now.end - now.begin);
-        if (!stays(was, by)) changes.push_back({was, by});
+        if (!stays(text_of(was), by, form)) changes.push_back({was, by});
     }
     return changes;
 }
@@ -362,7 +366,8 @@ Change added_before(std::string_view text, const TextRegion& other, const std::s
 // Returns, for each item of an array, the place among `now` of the one that it is, or kNone: the longest common sequence.
 // Nothing for arrays that are so long that it takes too much time.
 std::optional<std::vector<std::size_t>> common_items(const std::vector<std::string_view>& was,
-                                                     const std::vector<std::string_view>& now) {
+                                                     const std::vector<std::string_view>& now,
+                                                     NumberForm form) {
     constexpr std::size_t kMostPairs = 4'000'000;
     if (was.size() * now.size() > kMostPairs) return std::nullopt;
     const std::size_t width = now.size() + 1;
@@ -370,14 +375,14 @@ std::optional<std::vector<std::size_t>> common_items(const std::vector<std::stri
     for (std::size_t i = was.size(); i-- > 0;) {
         for (std::size_t k = now.size(); k-- > 0;) {
             const std::size_t at = i * width + k;
-            longest[at] = is_same_number(was[i], now[k]) ? std::uint16_t(longest[at + width + 1] + 1)
-                                                         : std::max(longest[at + width], longest[at + 1]);
+            longest[at] = stays(was[i], now[k], form) ? std::uint16_t(longest[at + width + 1] + 1)
+                                                      : std::max(longest[at + width], longest[at + 1]);
         }
     }
     std::vector<std::size_t> found(was.size(), kNone);
     for (std::size_t i = 0, k = 0; i < was.size() && k < now.size();) {
         const std::size_t at = i * width + k;
-        if (is_same_number(was[i], now[k]))
+        if (stays(was[i], now[k], form))
             found[i++] = k++;
         else if (longest[at + width] >= longest[at + 1])
             ++i;
@@ -390,7 +395,7 @@ std::optional<std::vector<std::size_t>> common_items(const std::vector<std::stri
 // Returns the text with items of an array more or less, and all else in it as it was, comments too; nothing where none of
 // them stays.
 std::optional<std::string> with_items(std::string_view text, const TextPath& path, const TomlNode& node,
-                                      std::string_view value) {
+                                      std::string_view value, NumberForm form) {
     if (node.form != Form::array || !value.starts_with('[')) return std::nullopt;
     const std::string whole = "v = " + std::string(value);
     const TomlNode parsed = toml_tree(whole);
@@ -403,7 +408,7 @@ std::optional<std::string> with_items(std::string_view text, const TextPath& pat
     const std::vector<std::string_view> was = texts_of(text, node.items),
                                         now = texts_of(whole, parsed.find("v")->items);
     if (was.size() == now.size()) return std::nullopt;
-    const auto found = common_items(was, now);
+    const auto found = common_items(was, now, form);
     if (!found) return std::nullopt;
     const std::size_t kept = was.size() - std::size_t(std::ranges::count(*found, kNone));
     if (kept == 0 && !was.empty() && !now.empty()) return std::nullopt;
@@ -502,7 +507,8 @@ std::string with_value(std::string_view text, const TextPath& path, std::string_
     if (reached.steps < path.size()) return applied(text, {missing_key(text, root, path, reached, value)});
     const TomlNode& node = *reached.node;
     if (node.form == Form::value || node.form == Form::array || node.form == Form::inlined) {
-        if (std::optional<std::string> items = with_items(text, path, node, value)) return *std::move(items);
+        if (std::optional<std::string> items = with_items(text, path, node, value, form))
+            return *std::move(items);
         return applied(text, replaced_value(text, node, value, form));
     }
     refuse(path, "is a table: its keys are set one by one");

@@ -43,7 +43,8 @@ const TomlNode* find_node(const TomlNode& root, const TextPath& path);
 enum class NumberForm { any, integer };
 
 // Sets a key to a value, which is TOML on one line. A key that is not there is added: to its table after the last key,
-// or in a new section at the end. Of an array only the items change that differ, come or go: comments between the others stay.
+// or in a new section at the end. Of an array only the items change that differ, come or go: comments between the others stay. Those of
+// one as long are taken by their place.
 std::string with_value(std::string_view text, const TextPath& path, std::string_view value,
                        NumberForm form = NumberForm::any);
 

@@ -212,6 +212,52 @@ class Safety(Case):
         scene.write_text(text, encoding="utf-8")
         self.edit(scene, script="wait-step 1\nclick scene\nwait 0.2\nset seed 12abc\nwait 0.3\nexpect-control refusal\n")
 
+    def test_tab_goes_on_and_on(self):
+        """From field to field, as fast as one types."""
+        scene = self.folder / "d.toml"
+        text = 'name = "models"\nseed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n'
+        for pause in ("wait 0.3\n", ""):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script="wait-step 1\nclick lattice\nwait 0.2\ndouble-click-at lattice.cells[0] 0.5 0.5\nkey CTRL+A\ntype 20\n"
+                                    f"key TAB\n{pause}type 21\nkey TAB\n{pause}type 22\nwait 0.2\nkey ENTER\nkey CTRL+S\nwait 0.5\n")
+            self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("[16, 16, 12]", "[20, 21, 22]"), pause)
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script=f"wait-step 1\nclick scene\nwait 0.2\nclick name\nkey END\ntype xyz\nkey TAB\n{pause}type 77\nwait 0.2\nkey ENTER\n"
+                                    "wait 0.3\nkey CTRL+S\nwait 0.5\n")
+            self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("models", "modelsxyz").replace("= 4", "= 77"), pause)
+
+    def test_a_recorded_wind_is_the_whole_number(self):
+        """Typed key by key or dragged, while key frames are recorded; Escape records nothing."""
+        scene = self.folder / "w.toml"
+        text = ('name = "w"\n[lattice]\ncells = [16, 16, 12]\n[[wind]]\n'
+                'levels = [{ height_m = 1000, from_deg = 250, speed_m_per_s = 7.5 }] # low\n')
+        start = ('wait 0.3\nkey SPACE\nkey HOME\nwait 0.3\nkey .\nkey .\nwait 0.4\nclick "tab View"\nclick "Record as key frames"\n'
+                 "click wind\nclick wind[0]\nclick wind[0].levels\nclick wind[0].levels[0]\nwait 0.3\n")
+        typed = "double-click-at wind[0].levels[0].speed_m_per_s 0.5 0.5\nkey CTRL+A\ntype 1\nwait 0.3\ntype 2\nwait 0.3\ntype .5\nwait 0.3\n"
+        for act, least, most in ((typed + "key ENTER\n", 12.4999, 12.5001), (typed + "key TAB\n", 12.4999, 12.5001),
+                                 ("drag wind[0].levels[0].speed_m_per_s 60 0\n", 9, 13), (typed + "key ESCAPE\n", None, None)):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script=f"{start}{act}wait 0.3\nkey CTRL+S\nwait 0.5\n")
+            written = scene.read_text(encoding="utf-8")
+            if least is None:
+                self.assertEqual(written, text)
+                continue
+            level, = tomllib.loads(written)["wind"][-1]["levels"]
+            speed = (level["east_m_per_s"] ** 2 + level["north_m_per_s"] ** 2) ** 0.5
+            self.assertTrue(least <= speed <= most, f"{act}\n{written}")
+
+    def test_a_handle_moves_one_coordinate(self):
+        scene = self.folder / "h.toml"
+        text = ('seed = 4\n[lattice]\ncells = [32, 32, 24]\ncell_size_m = 100\n[field]\nellipsoids = [{ centre_m = [0.123456, 0.654321, 1200.5], '
+                "semi_axes_m = [333.25, 444.5, 222.125] }]\n")
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script="wait-step 1\nclick field\nclick field.ellipsoids\nclick field.ellipsoids[0]\nwait 0.3\nkey F\nwait 0.5\n"
+                                'drag "handle move east" 40 0\nwait 0.3\nkey CTRL+S\nwait 0.5\n')
+        parcel = tomllib.loads(scene.read_text(encoding="utf-8"))["field"]["ellipsoids"][0]
+        self.assertNotEqual(parcel["centre_m"][0], 0.123456)
+        self.assertEqual(parcel["centre_m"][1:], [0.654321, 1200.5])
+        self.assertEqual(parcel["semi_axes_m"], [333.25, 444.5, 222.125])
+
     def test_what_is_typed_into_a_number_is_one_step_of_undo(self):
         """However slowly; and Escape gives a colour back with all of its digits."""
         scene = self.folder / "c.toml"
