@@ -83,7 +83,6 @@ VdbMetadata FrameWriter::metadata_of(const FrameResult& frame, const StateHash& 
     return metadata;
 }
 
-// Returns whether fields of wind move the voxels of a file: a layer's, or those of all. Veils move with the profile alone.
 bool moves_with_fields(const Scene& scene, std::optional<std::size_t> layer) {
     const auto moves = [](const LayerOptions& of) { return !of.is_veil; };
     if (layer) return moves(scene.layers[*layer]);

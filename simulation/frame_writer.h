@@ -5,6 +5,7 @@
 // either complete or not there.
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,6 +26,9 @@ struct WrittenFile {
     FileDigest digest;
     std::string voxels;  // voxel_digest() of a density file as it is read back; empty for others
 };
+
+// Returns whether fields of wind move the voxels of a file: a layer's, or those of all. Veils move with the profile alone.
+bool moves_with_fields(const Scene& scene, std::optional<std::size_t> layer);
 
 class FrameWriter {
   public:

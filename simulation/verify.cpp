@@ -2,7 +2,6 @@
 #include "simulation/verify.h"
 
 #include <algorithm>
-#include <functional>
 #include <map>
 #include <set>
 #include <string>
@@ -27,26 +26,22 @@
 namespace nephos {
 namespace {
 
-// Files of frames below the folder that the manifest does not list.
-std::vector<std::filesystem::path> extra_files(const RunListing& run, const std::set<std::string>& listed) {
-    std::vector<std::filesystem::path> extra;
-    const std::function<void(const std::filesystem::path&)> look_into =
-        [&](const std::filesystem::path& part) {
-            for (const std::string& name : names_in_folder(run.folder / part)) {
-                const std::filesystem::path path = part / name;
-                std::error_code error;
-                const auto type = std::filesystem::symlink_status(run.folder / path, error).type();
-                if (type == std::filesystem::file_type::none)
-                    throw ReadFailure(run.folder / path, error.message(), "examine");
-                if (type == std::filesystem::file_type::directory)
-                    look_into(path);
-                else if (!listed.contains(path.generic_string()))
-                    extra.push_back(path);
-            }
-        };
-    for (const char* part : {"density", "frames", "statistics"}) look_into(part);
-    std::sort(extra.begin(), extra.end());
-    return extra;
+// Adds the files below a part of the folder that the manifest does not list. What a link to a folder leads to is somebody else's.
+void add_extra_files(const RunListing& run, const std::set<std::string>& listed,
+                     const std::filesystem::path& part, std::vector<std::filesystem::path>& extra) {
+    for (const std::string& name : names_in_folder(run.folder / part)) {
+        const std::filesystem::path path = part / name;
+        std::error_code error;
+        const auto type = std::filesystem::symlink_status(run.folder / path, error).type();
+        if (type == std::filesystem::file_type::none)
+            throw ReadFailure(run.folder / path, error.message(), "examine");
+        if (type == std::filesystem::file_type::directory) {
+            add_extra_files(run, listed, path, extra);
+        } else if (!std::filesystem::is_directory(run.folder / path, error) &&
+                   !listed.contains(path.generic_string())) {
+            extra.push_back(path);
+        }
+    }
 }
 
 Check check_numbers(const RunListing& run) {
@@ -225,7 +220,8 @@ Verification verify_run(const std::filesystem::path& folder, const VerifyOptions
     std::vector<std::filesystem::path> extra;
     Problems unlisted;
     try {
-        extra = extra_files(run, names);
+        for (const char* part : {"density", "frames", "statistics"}) add_extra_files(run, names, part, extra);
+        std::ranges::sort(extra);
     } catch (const ReadFailure& failure) {
         unlisted.add(failure.what());
     }

@@ -227,7 +227,8 @@ TrackStatistics track_statistics(std::span<const Track> tracks, std::uint64_t fi
     // survival[t] = S(t); between t and t + 1 it is constant.
     std::vector<double> survival(ages), greenwood(ages);
     std::uint64_t at_risk = result.tracks;
-    constexpr double kHalf = 0.5 * (1 + 1e-12);  // products that are one half are rounded
+    // Products that are one half are rounded, by an epsilon a factor at most.
+    const double half = 0.5 * (1 + 2 * double(ages) * std::numeric_limits<double>::epsilon());
     double s = 1;
     for (std::size_t t = 0; t < ages; ++t) {
         if (deaths[t] > 0) {
@@ -236,7 +237,7 @@ TrackStatistics track_statistics(std::span<const Track> tracks, std::uint64_t fi
             greenwood[t] = n > d ? d / (n * (n - d)) : 0;
         }
         survival[t] = s;
-        if (s <= kHalf && std::isnan(result.median)) result.median = double(t);
+        if (s <= half && std::isnan(result.median)) result.median = double(t);
         at_risk -= deaths[t] + censored[t];
     }
     // The area under S from 0 to the greatest age, and the part of it beyond each age.

@@ -54,6 +54,8 @@ BitPlane plane_of(const Extent& extent, double threshold, Value&& value) {
     return plane;
 }
 
+constexpr std::uint64_t kMostColumns = std::uint64_t(1) << 28;
+
 CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& options) {
     VdbReadOptions reading;
     reading.grid = options.variable;
@@ -63,6 +65,14 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
         fail(ErrorCode::usage, path,
              fmt::format("has voxels of {} m itself: leave out the size of cells and levels", size));
     const Extent extent = grid.extent();
+    if (const int longest = std::max({extent.x, extent.y, extent.z}); longest > kMaxExtent)
+        fail(ErrorCode::io, path,
+             fmt::format("has {} voxels along an axis; at most {} can be read", longest, kMaxExtent));
+    // Columns are gone over for each random field that the organisation of the clouds is compared with.
+    if (std::uint64_t(extent.x) * std::uint64_t(extent.y) > kMostColumns)
+        fail(ErrorCode::io, path,
+             fmt::format("has {} x {} columns of voxels; at most {} can be read", extent.x, extent.y,
+                         kMostColumns));
     require_memory(BitPlane::bytes(extent), fmt::format("{}: the mask of {} x {} x {} voxels around its grid",
                                                         path.string(), extent.x, extent.y, extent.z));
     CloudMasks masks{{}, size, size, {grid.placement().origin_m.z}, options.boundaries, false, 0, {}};
@@ -134,7 +144,7 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
     const double size = cell_size(path, options);
     require_no_height(path, options);
     // Deflate makes at most 1,032 bytes of one, and a pixel has at least a bit: a header that claims more lies.
-    constexpr std::uint64_t kMostPixels = std::uint64_t(1) << 28, kPixelsOfByte = 8 * 1040;
+    constexpr std::uint64_t kMostPixels = kMostColumns, kPixelsOfByte = 8 * 1040;
     constexpr std::uint64_t kMostBytes = std::uint64_t(1) << 30;
     require_regular_file(path);
     std::error_code error;

@@ -209,10 +209,10 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
 
 std::string failed_runs_text(const FitResult& result) {
     return fmt::format(
-        "{} runs failed: failures.csv of each wave has them with the command that repeats each, "
-        "--retry-failed "
-        "runs them again",
-        result.failed);
+        "{} failed: failures.csv of each wave has the command that repeats each, --retry-failed runs again "
+        "what "
+        "failed",
+        result.failed == 1 ? "1 run" : std::to_string(result.failed) + " runs");
 }
 
 std::string fit_text(const FitOptions& options, const FitResult& result) {

@@ -43,7 +43,7 @@ std::string failure_line(const PlannedRun& run, std::string_view message);
 // What the records are read for: it decides what helps against those of another version, and against files that cannot be
 // read.
 enum class RecordsFor {
-    running,  // by a command that has --overwrite, and writes runs
+    running,  // by a command that has --overwrite
     showing,  // by one that writes no records
 };
 

@@ -214,7 +214,7 @@ bool has_runs_of(const SweepPlan& plan, const std::filesystem::path& folder) {
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job) {
     const Records records = Records::read({job.folder});
     SweepReport report = status_of(plan, job, records);
-    if (!report.complete)
+    if (!report.complete || report.progress.failed > 0)
         report.problems.insert(report.problems.end(), records.damaged_ends().begin(),
                                records.damaged_ends().end());
     return report;
@@ -335,7 +335,7 @@ Records records_of_folders(const SweepPlan& plan, const std::vector<std::filesys
     bool complete = true;
     for (std::uint64_t n = 0; n < plan.runs(); ++n) {
         const RunRecord* record = records.find(plan.run(n).id);
-        complete = complete && record != nullptr;
+        complete = complete && record != nullptr && !record->failed;
         if (record != nullptr) ++used[records.folder_of(*record)];
     }
     if (!complete) records.count_damaged_ends_as_problems();

@@ -242,6 +242,8 @@ int run(const RunArguments& a) {
     }
     limit_threads(a.work.threads);
     RunSettings settings = settings_of(a);
+    const bool wants_frames = settings.scene.frames.enabled && !a.statistics_only;
+    const int frames_of_scene = settings.scene.frames.count;
     std::unique_ptr<ProgressBar> bar;
     RunObserver observer;
     observer.progress = [&](const RunProgress& progress) {
@@ -274,6 +276,11 @@ int run(const RunArguments& a) {
         print_note(report.folder.string() +
                    ": the earlier run left no checkpoint to go on from, so it started anew "
                    "(--checkpoint leaves one)");
+    if (wants_frames && report.complete && report.frames == 0 && !a.work.quiet)
+        print_note(
+            fmt::format("no frame lies in these steps (frames.start_s, and frames.count = {}): "
+                        "--statistics-only says that none is wanted",
+                        frames_of_scene));
     if (report.skipped && !a.work.quiet) print_note(report.folder.string() + ": is complete already");
     if (a.work.json) {
         print_json(report);
@@ -351,8 +358,9 @@ void add_run_command(CLI::App& app, Action& action) {
         "  nephos run scenes/cumulus.toml\n"
         "  nephos run scenes/stratus.toml --out /tmp/st --no-render --set time.steps=500\n"
         "  nephos run scenes/cumulus.toml --resume\n"
-        "  nephos run --from out/cumulus --set field.background.ext=0.4 --set time.steps=600 --out "
-        "out/drier");
+        "  nephos run --from out/cumulus --set field.background.ext=0.4 --set time.steps=600 "
+        "--statistics-only \\\n"
+        "             --out out/drier");
     command->callback([a, &action] { action = [a] { return run(*a); }; });
 }
 

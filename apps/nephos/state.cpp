@@ -38,9 +38,13 @@ std::size_t chosen_layer(const StateArguments& a, const std::vector<LayerSimulat
         if (layers[n].name() == a.layer || (a.layer.empty() && layers.size() == 1)) return n;
         if (!layers[n].name().empty()) names.push_back(layers[n].name());
     }
-    if (names.empty() && !a.layer.empty())
+    const bool has_any = std::ranges::any_of(
+        layers, [](const LayerSimulation& layer) { return layer.automaton() != nullptr; });
+    if (!has_any)
         throw Error(ErrorCode::usage,
-                    a.scene.file + ": has no layers with an automaton: leave out --layer '" + a.layer + "'");
+                    a.scene.file + ": has no layer with an automaton, whose bits a state is");
+    if (names.empty() && !a.layer.empty())
+        throw Error(ErrorCode::usage, a.scene.file + ": has no layers: leave out --layer '" + a.layer + "'");
     const std::string_view meant = closest_word(a.layer, names);
     throw Error(ErrorCode::usage,
                 a.layer.empty() ? fmt::format("{}: has several layers: give --layer, one of {}", a.scene.file,

@@ -81,7 +81,11 @@ void run_sandboxed(const std::filesystem::path& subject, std::string_view parser
 // Returns the reason of an error where reading takes more memory than this.
 std::string too_large(std::size_t memory_bytes);
 
-// Returns `text` without control characters, cut to `length`.
+// Returns `text` in ASCII without control characters, cut to `length`: a message of a foreign parser.
 std::string clamp_message(std::string_view text, std::size_t length = 300);
+
+// Returns `text` as UTF-8, whose invalid bytes are `?`, cut to `length` between characters: a name or value of a foreign file. Control
+// characters stay; whoever prints it escapes them.
+std::string clamp_text(std::string_view text, std::size_t length = 300);
 
 }  // namespace nephos

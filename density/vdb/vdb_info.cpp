@@ -70,8 +70,8 @@ void send_entries(const openvdb::MetaMap& map, SandboxWriter& writer) {
     writer.value(std::uint32_t(map.metaCount()));
     for (auto at = map.beginMeta(); at != map.endMeta(); ++at) {  // a std::map: ordered by name
         const VdbMetadataEntry entry = entry_of(at->first, *at->second);
-        writer.text(clamp_message(entry.name, kMaxMetadataText));
-        writer.text(clamp_message(entry.value, kMaxMetadataText));
+        writer.text(clamp_text(entry.name, kMaxMetadataText));
+        writer.text(clamp_text(entry.value, kMaxMetadataText));
         writer.value(std::uint8_t(entry.is_json));
     }
 }
@@ -137,7 +137,7 @@ void send_info(VdbArchive& archive, SandboxWriter& writer) {
         const auto& [descriptor, header] = archive.entries()[n];
         const bool half = descriptor.saveFloatAsHalf();
         const std::string type = header->valueType();
-        writer.text(clamp_message(descriptor.gridName()));
+        writer.text(clamp_text(descriptor.gridName()));
         writer.text(clamp_message(!half ? type : type == "float" ? "half" : type + " as half"));
         writer.text(openvdb::GridBase::gridClassToString(header->getGridClass()));
         const openvdb::Vec3d size = header->transform().voxelSize();

@@ -161,7 +161,7 @@ void send_metadata(SandboxWriter& writer, const std::optional<VdbMetadata>& meta
     writer.value(metadata->random_stream_version);
     for (const std::string* text :
          {&metadata->scene_hash, &metadata->state_hash, &metadata->nephos_version}) {
-        writer.text(clamp_message(*text, kMaxMetadataText));
+        writer.text(clamp_text(*text, kMaxMetadataText));
     }
     const Georeference& place = metadata->georeference;
     writer.value(std::uint8_t(place.given));
@@ -257,7 +257,7 @@ void send_density(VdbArchive& archive, const VdbReadOptions& options, bool masks
 LoadedDensity receive_density(SandboxReader& reader, bool list_grids) {
     LoadedDensity loaded;
     if (list_grids) loaded.info = receive_info(reader);
-    loaded.grid_name = clamp_message(reader.text(), kMaxMetadataText);
+    loaded.grid_name = clamp_text(reader.text(), kMaxMetadataText);
     loaded.metadata = receive_metadata(reader);
     loaded.refine = std::clamp(reader.value<int>(), 1, kMaxRefine);
     const auto extent = reader.value<Extent>();

@@ -375,10 +375,12 @@ class Reader {
             take("not observed", false);
             return true;
         }
-        if (seen_temperature_) fail("the report has a temperature already");
-        seen_temperature_ = true;
-        metar_.temperature_c = temperature;
-        metar_.dew_point_c = dew;
+        if (temperature || dew) {  // of unknown ones there may be more
+            if (seen_temperature_) fail("the report has a temperature already");
+            seen_temperature_ = true;
+            metar_.temperature_c = temperature;
+            metar_.dew_point_c = dew;
+        }
         take(temperature ? "temperature and dew point" : "temperature unknown", temperature.has_value());
         return true;
     }

@@ -263,6 +263,14 @@ std::string readme_text(const ExportOptions& options, const std::vector<ExportSe
     text +=
         "  export.json        bytes and XXH3-128 of each file; `nephos verify` of this folder checks them\n";
     const int columns = slice_columns(box.size[0], box.size[1], box.size[2]);
+    const int rows = (box.size[2] + columns - 1) / columns, empty = rows * columns - box.size[2];
+    const std::string texture_end =
+        empty == 0 ? std::string("max_m of the sidecar")
+                   : fmt::format(
+                         "[{}, {}, {}] m: the picture ends with {} empty slices behind max_m of the "
+                         "sidecar, which are part of the texture",
+                         number_text(box.max_m[0], 9), number_text(box.max_m[1], 9),
+                         number_text(box.max_m[2] + empty * box.voxel_m[2], 9), empty);
     const std::pair<const char*, std::string> values[] = {
         {"{NAME}", s.name},
         {"{FIRST}",
@@ -276,7 +284,8 @@ std::string readme_text(const ExportOptions& options, const std::vector<ExportSe
         {"{SHIFT}", number_text(-box.voxel_m[0] / 2, 6)},
         {"{VELOCITY_SCALE}", number_text(s.metadata.time_scale / std::max(1e-9, s.frames_per_second), 6)},
         {"{COLUMNS}", std::to_string(columns)},
-        {"{ROWS}", std::to_string((box.size[2] + columns - 1) / columns)},
+        {"{ROWS}", std::to_string(rows)},
+        {"{TEXTURE_END}", texture_end},
     };
     for (const auto& [key, value] : values) replace_all(text, key, value);
     return text;

@@ -12,6 +12,8 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/wind.h"
+#include "core/wind_field.h"
 #include "density/combine.h"
 #include "density/export/bricks.h"
 #include "density/export/cloud_picture.h"
@@ -38,7 +40,7 @@ DensityGrid grid_of(const DensityGrid& density, int factor) {
 }
 
 void write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s,
-                    const LoadedDensity& loaded) {
+                    const LoadedDensity& loaded, double time_s) {
     DensityGrid density = grid_of(loaded.density, s.layout.factor);
     VdbContent content;
     VdbMetadata metadata = loaded.metadata.value_or(VdbMetadata{});
@@ -50,9 +52,15 @@ void write_vdb_file(const std::filesystem::path& path, const ExportOptions& opti
     content.cells = density.placement();
     content.cells.cell_size_m *= refine;
     content.half = options.type == VoxelType::r16f;
-    if (!options.velocity_name.empty() && !metadata.wind.empty()) {
-        const Wind wind{{{0, metadata.wind}}};
+    if (!options.velocity_name.empty() && (!metadata.wind.empty() || !s.wind_fields.empty())) {
+        Wind wind;
+        if (!metadata.wind.empty()) wind.keyframes.push_back({0, metadata.wind});
         const Placement& at = loaded.density.placement();
+        const Vec3 shift = at.origin_m - density.placement().origin_m;
+        if (!s.wind_fields.empty())
+            content.wind_field = [&s, shift, time_s](const Vec3& place_m) {
+                return velocity_of(s.wind_fields, place_m + shift, time_s);
+            };
         for (int k = 0; k < density.extent().z; ++k)
             content.wind.push_back(
                 wind_at(wind, at.origin_m.z + (k + 0.5) * density.placement().cell_size_m, 0));
@@ -152,7 +160,7 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
         if (format == ExportFormat::vdb && is_copy(options_, s, frame, source)) {
             copy_atomically(frame.file, path);
         } else if (format == ExportFormat::vdb) {
-            write_vdb_file(path, options_, s, loaded);
+            write_vdb_file(path, options_, s, loaded, frame.time_s);
         } else if (format == ExportFormat::flightgear) {
             VolumeLayout layout;
             layout.factor = s.layout.factor;

@@ -13,6 +13,7 @@
 #include "density/export/bricks.h"
 #include "scenes/format/text.h"
 #include "simulation/export/weather.h"
+#include "simulation/frame_writer.h"
 #include "simulation/run_listing.h"
 #include "simulation/scene_place.h"
 
@@ -102,6 +103,7 @@ ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& r
     const std::optional<std::size_t> index =
         layer ? std::optional(layer_index(run.scene, *layer)) : std::nullopt;
     s.wind = wind_of(run.scene, index, s);
+    if (moves_with_fields(run.scene, index)) s.wind_fields = run.scene.automaton.wind.fields;
     if (index || run.scene.layers.size() == 1)
         s.genus = genus_of(run.scene, run.scene.layers[index.value_or(0)]);
     return s;
@@ -374,7 +376,13 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
     }
     for (ExportSequence& s : sequences) {
         choose_layout(options, s, notes);
-        if (!options.velocity_name.empty() && s.metadata.wind.empty())
+        if (options.velocity_name.empty()) continue;
+        const auto is_of_files = [](const WindField& field) { return field.kind == WindFieldKind::grid; };
+        if (std::ranges::any_of(s.wind_fields, is_of_files))
+            notes.push_back(s.name + ": the wind that the scene has from files is not in the grid `" +
+                            options.velocity_name +
+                            "` (density.write_velocity writes it into those of the run)");
+        if (s.metadata.wind.empty() && s.wind_fields.empty())
             notes.push_back(s.name + ": the air is calm: its VDB files have no grid `" +
                             options.velocity_name + "`");
     }

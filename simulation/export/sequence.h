@@ -13,6 +13,7 @@
 
 #include "core/digest.h"
 #include "core/file_stamp.h"
+#include "core/wind_field.h"
 #include "density/vdb/vdb_file.h"
 #include "simulation/export/export.h"
 
@@ -49,6 +50,8 @@ struct ExportSequence {
     int refine = 1;
     double frames_per_second = 24;
     std::vector<WindTable> wind;
+    std::vector<WindField>
+        wind_fields;  // that a run's voxels move with beside it; grids without their samples
     // How its boxes are made of its grids.
     VolumeLayout layout;
     int levels = 1;

@@ -21,19 +21,19 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uint16_t kCigiRegion = 1;
 
-// X-Plane's types: 0 cirrus, 1 stratus, 2 cumulus, 3 cumulonimbus.
+// X-Plane's types: 0 cirrus, 1 stratus, 2 cumulus, 3 cumulonimbus. Of an unknown genus that of cumulus, which the automaton makes.
 int xplane_type(const std::string& genus) {
     if (genus.starts_with("Ci") || genus == "Cc" || genus == "Cs") return 0;
     if (genus == "Cb") return 3;
-    return genus == "Cu" ? 2 : 1;
+    return genus == "Cu" || genus.empty() ? 2 : 1;
 }
 
-// CIGI's cloud types 1 to 10; 0: none of them.
+// CIGI's cloud types 1 to 10, likewise.
 int cigi_type(const std::string& genus) {
     constexpr const char* kTypes[] = {"", "Ac", "As", "Cc", "Cs", "Ci", "Cb", "Cu", "Ns", "Sc", "St"};
     for (int n = 1; n <= 10; ++n)
         if (genus == kTypes[n]) return n;
-    return genus == "VV" ? 10 : 0;  // an obscured sky: stratus
+    return genus == "VV" ? 10 : 7;  // an obscured sky: stratus
 }
 
 template <class T>

@@ -13,6 +13,7 @@
 #include "density/vdb/vdb_file.h"
 #include "scenes/metar/metar.h"
 #include "scenes/metar/metar_scene.h"
+#include "seeds/genera.h"
 #include "simulation/scene_place.h"
 
 namespace nephos {
@@ -55,17 +56,35 @@ Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : 
 }  // namespace
 
 std::string genus_of(const Scene& scene, const LayerOptions& layer) {
-    static constexpr const char* kGenera[] = {"Ci", "Cc", "Cs", "Ac", "As", "Ns",
-                                              "Sc", "St", "Cu", "Cb", "VV"};
-    for (const char* genus : kGenera) {
-        const std::string rest = layer.name.starts_with(genus) ? layer.name.substr(2) : "x";
-        if (rest.find_first_not_of("0123456789") == rest.npos) return genus;
+    // "Cu", "Cu1", "Cu-2": a name that is an abbreviation, and perhaps a number.
+    const auto of_name = [](const std::string& name) -> std::string {
+        static constexpr const char* kGenera[] = {"Ci", "Cc", "Cs", "Ac", "As", "Ns",
+                                                  "Sc", "St", "Cu", "Cb", "VV"};
+        for (const char* genus : kGenera)
+            if (name.starts_with(genus) && name.find_first_not_of("0123456789-_ ", 2) == name.npos)
+                return genus;
+        return {};
+    };
+    if (std::string genus = of_name(layer.name); !genus.empty()) return genus;
+    if (layer.is_veil) {
+        switch (layer.veil.form) {
+            case VeilForm::cumulus:
+                return "Cu";
+            case VeilForm::stratus:
+                return "St";
+            case VeilForm::cirrus:
+                return "Ci";
+            case VeilForm::cirrostratus:
+                return "Cs";
+        }
     }
-    for (const std::string& sky : layer.skies) {
-        for (const NamedSky& named : scene.skies) {
-            if (named.name != sky || named.models.empty()) continue;
-            for (const char* genus : kGenera)
-                if (named.models.front().starts_with(genus)) return genus;
+    for (const NamedSky& sky : scene.skies) {
+        if (std::ranges::count(layer.skies, sky.name) == 0) continue;
+        for (const std::string& name : sky.models) {
+            const auto model = std::ranges::find(scene.models, name, &BaseModel::name);
+            if (model != scene.models.end() && model->genus)
+                return std::string(facts_of(*model->genus).abbreviation.substr(0, 2));  // "St" of "St fra"
+            if (std::string genus = of_name(name); !genus.empty()) return genus;
         }
     }
     return {};

@@ -173,6 +173,34 @@ class Export(Case):
         self.call("export", *sorted((self.folder / "run/density").glob("*.vdb")), "--to", "raw", "-o", "calm")
         self.assertEqual(json.loads(next((self.folder / "calm").glob("*.volume.json")).read_text())["wind"], [])
 
+    def test_velocity_has_the_fields_of_the_wind(self):
+        """Those of the run's own grid, also where there is no profile; those of files are told."""
+        import pyopenvdb
+        field = "[[wind_field]]\nkind = \"vortex\"\nx_m = 400\ny_m = 300\nradius_m = 300\nspeed_m_per_s = 8\n"
+        self.call("run", self.write("vortex.toml", SCENE + field), "--no-render", "--set", "density.write_velocity=true", "--out", "vortex")
+        said = self.call("export", "vortex", "--to", "vdb", "--velocity", "v", "-o", "fields").stderr
+        self.assertNotIn("calm", said)
+        own, exported = (pyopenvdb.read(str(self.folder / folder / "vortex_0002.vdb"), name).getConstAccessor()
+                         for folder, name in (("vortex/density", "vel"), ("fields", "v")))
+        for voxel in ((0, 0, 0), (5, 9, 3), (31, 23, 11), (12, 8, 6)):
+            for a, b in zip(own.getValue(voxel), exported.getValue(voxel)):
+                self.assertAlmostEqual(a, b, 5)
+        self.assertGreater(max(map(abs, own.getValue((5, 9, 3)))), 1)
+
+    def test_genera_are_those_of_the_models(self):
+        """Not of what their names begin with; clouds of no genus are cumulus, which the automaton makes."""
+        for name, genus, wanted, xplane in (("Storm", "Cb", "Cb", 3), ("Storm", "none", "", 2), ("Sc-2", "none", "Sc", 1)):
+            text = (f'name = "g"\nseed = 1\n[time]\nstep_s = 10\nsteps = 60\n[frames]\nstart_s = 590\ncount = 1\n[[model]]\nname = "{name}"\ngenus = "{genus}"\n'
+                    'seeds = [{ position_m = [0, 0, 300], size_m = [1500, 1500, 1000] }]\n[[sky]]\nname = "s"\nclouds = 8\nstate = 0\n'
+                    f'models = ["{name}"]\n[[layer]]\nname = "tower"\nskies = ["s"]\nbase_height_m = 1000\n'
+                    "lattice = { cells = [60, 60, 30], cell_size_m = 100, origin_m = [-3000, -3000, 900] }\n")
+            self.call("run", self.write("g.toml", text), "--no-render", "--out", "g", "--overwrite")
+            self.call("export", "g", "--to", "layers", "--to", "xplane", "-o", "summary")
+            layers = json.loads(next((self.folder / "summary").glob("*.layers.json")).read_text())
+            self.assertEqual(layers["frames"][0]["layers"][0]["genus"], wanted)
+            self.assertIn(f'"cloud_type": {xplane}', next((self.folder / "summary").glob("*.xplane.json")).read_text())
+            shutil.rmtree(self.folder / "summary")
+
     def test_values_beyond_16_bits_are_refused(self):
         import pyopenvdb
         grid = pyopenvdb.FloatGrid()

@@ -51,7 +51,7 @@ class State(Case):
     def test_what_is_read_is_not_replaced(self):
         text = pathlib.Path(self.scene).read_text()
         self.refused(2, "state", self.scene, "--steps", "1", "--out", os.path.relpath(self.scene, self.folder), says="is the file that is read")
-        self.refused(2, "state", self.scene, "--layer", "low", "--out", "state.vdb", says="has no layers with an automaton: leave out --layer 'low'")
+        self.refused(2, "state", self.scene, "--layer", "low", "--out", "state.vdb", says="has no layers: leave out --layer 'low'")
         report = self.write("report.txt", "METAR LOWW 241250Z 30012KT 9999 FEW040 12/05 Q1020\n")
         self.refused(2, "metar", f"@{report}", "--scene", report, says="is the file that is read")
         self.assertEqual(pathlib.Path(self.scene).read_text(), text)
