@@ -60,12 +60,14 @@ std::filesystem::path target_of(const std::filesystem::path& path) {
     std::error_code error;
     const auto kind = std::filesystem::status(path, error).type();
     if (kind == std::filesystem::file_type::directory) fail(path, "cannot be written", EISDIR);
+    if (kind == std::filesystem::file_type::none && error != std::errc::too_many_symbolic_link_levels)
+        fail(path, "cannot be examined", error.value());
     if (kind != std::filesystem::file_type::regular && kind != std::filesystem::file_type::not_found &&
         kind != std::filesystem::file_type::none) {
         throw Error(ErrorCode::io, path.string() + ": is not a regular file");
     }
     std::filesystem::path target = path;
-    for (int links = 0; std::filesystem::is_symlink(target, error); ++links) {
+    for (int links = 0; type_at(target) == std::filesystem::file_type::symlink; ++links) {
         if (links == kMostLinks) fail(path, "cannot follow the link", ELOOP);
         if (!is_trusted_link(target)) {
             const std::string link = links == 0 ? "" : "leads to " + target.string() + ", which ";
@@ -164,7 +166,11 @@ void AtomicFile::open_folder(const std::filesystem::path& folder) {
 void AtomicFile::take_permissions(int fd) {
     struct stat before {
     }, parent{}, now{};
-    if (::fstatat(folder_, name_.c_str(), &before, 0) != 0 || !S_ISREG(before.st_mode)) return;
+    if (::fstatat(folder_, name_.c_str(), &before, 0) != 0) {
+        if (errno == ENOENT || errno == ELOOP) return;
+        fail(path_, "cannot examine the file that is replaced", errno);
+    }
+    if (!S_ISREG(before.st_mode)) return;
     if (before.st_uid != ::geteuid()) {
         constexpr mode_t kOthersWrite = S_IWGRP | S_IWOTH;
         const bool is_sound =

@@ -56,11 +56,39 @@ void create_folders(const std::filesystem::path& folder) {
     for (const std::filesystem::path& holder : holders) flush_folder(holder, folder);
 }
 
-bool stands_there(const std::filesystem::path& path) {
-    std::error_code error;
-    const auto type = std::filesystem::symlink_status(path, error).type();
+namespace {
+
+std::filesystem::file_type known(const std::filesystem::path& path, std::filesystem::file_type type,
+                                 const std::error_code& error) {
     if (type == std::filesystem::file_type::none) throw ReadFailure(path, error.message(), "examine");
-    return type != std::filesystem::file_type::not_found;
+    return type;
+}
+
+}  // namespace
+
+std::filesystem::file_type type_at(const std::filesystem::path& path) {
+    std::error_code error;
+    return known(path, std::filesystem::symlink_status(path, error).type(), error);
+}
+
+std::filesystem::file_type type_behind(const std::filesystem::path& path) {
+    std::error_code error;
+    return known(path, std::filesystem::status(path, error).type(), error);
+}
+
+bool stands_there(const std::filesystem::path& path) {
+    return type_at(path) != std::filesystem::file_type::not_found;
+}
+
+bool is_same_place(const std::filesystem::path& a, const std::filesystem::path& b) {
+    if (a.empty() || b.empty()) return false;
+    for (const std::filesystem::path* path : {&a, &b})
+        if (type_behind(*path) == std::filesystem::file_type::not_found) return false;
+    std::error_code error;
+    const bool same = std::filesystem::equivalent(a, b, error);
+    if (error && error != std::errc::no_such_file_or_directory)
+        throw ReadFailure(a, error.message(), "examine");
+    return same && !error;
 }
 
 std::filesystem::path normal_path(const std::filesystem::path& path) {

@@ -11,8 +11,16 @@ namespace nephos {
 // later are not lost with their folder. Does nothing where the folder is there. Throws Error(io) naming `folder`.
 void create_folders(const std::filesystem::path& folder);
 
-// Returns whether something stands at a path, links not followed. Throws ReadFailure where the system cannot say.
+// Return what stands at a path, links not followed or followed; file_type::not_found for nothing. Throw ReadFailure where the system
+// cannot say: then nothing may be taken for missing, or for a file of another kind.
+std::filesystem::file_type type_at(const std::filesystem::path& path);
+std::filesystem::file_type type_behind(const std::filesystem::path& path);
+
+// Returns whether something stands at a path, links not followed. Throws as these.
 bool stands_there(const std::filesystem::path& path);
+
+// Returns whether two paths, links followed, lead to one file or folder; false where either is not there. Throws as these.
+bool is_same_place(const std::filesystem::path& a, const std::filesystem::path& b);
 
 // Returns the path without "." and "..": by its text where that leads to the same file as the system's way, otherwise, where
 // ".." goes back through a link, with the links of its folder resolved. Where nothing is there it is by its text.

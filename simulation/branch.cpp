@@ -13,6 +13,7 @@
 #include "core/descriptor.h"
 #include "core/digest.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "simulation/earlier_run.h"
 #include "simulation/manifest.h"
 #include "simulation/statistics_file.h"
@@ -167,8 +168,7 @@ Simulation branched_simulation(const RunSettings& settings, const RunFolder& fol
         throw Error(ErrorCode::io, settings.branch->checkpoint.string() +
                                        ": was changed while the branch began: give the same command again");
     const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
-    std::error_code failed;
-    if (std::filesystem::equivalent(parent.folder.empty() ? "." : parent.folder, folder.folder, failed)) {
+    if (is_same_place(parent.folder.empty() ? "." : parent.folder, folder.folder)) {
         throw Error(ErrorCode::usage, folder.folder.string() +
                                           ": is the folder of the run that is branched off: expected another one");
     }

@@ -47,11 +47,9 @@ void remove_file(const std::filesystem::path& path) {
 std::vector<std::string> frame_parts(const RunFolder& folder) {
     std::vector<std::string> parts{"density", "frames"};
     for (const std::string& name : names_in_folder(folder.folder / "density")) {
-        const std::filesystem::path path = folder.folder / "density" / name;
-        std::error_code error;
-        const auto type = std::filesystem::symlink_status(path, error).type();
-        if (type == std::filesystem::file_type::none) throw ReadFailure(path, error.message(), "examine");
-        if (type == std::filesystem::file_type::directory) parts.push_back("density/" + name);
+        // Also behind a link, as to another disk: what a run writes there it must not take from others.
+        if (type_behind(folder.folder / "density" / name) == std::filesystem::file_type::directory)
+            parts.push_back("density/" + name);
     }
     return parts;
 }
@@ -248,6 +246,7 @@ void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput
     if (begins_with.empty()) return;
     for (const std::filesystem::path& file : earlier_files(folder)) {
         const FileStamp stamp = file_stamp(file);
+        if (stamp.inode == 0 && is_there(file)) throw ReadFailure(file, "it changes", "examine");
         const auto found = begins_with.find({stamp.device, stamp.inode});
         if (found == begins_with.end()) continue;
         throw Error(ErrorCode::usage, fmt::format("{}: is what `{}` names, and a file of the run in {}, "

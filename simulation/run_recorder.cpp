@@ -109,8 +109,11 @@ void RunRecorder::take_over(const Simulation& simulation) {
 void RunRecorder::require_size(const FileRecord& file) const {
     const std::filesystem::path path = folder_.folder / file.path;
     std::error_code error;
-    const bool is_file = std::filesystem::is_regular_file(path, error);
-    if (!error && is_file && std::filesystem::file_size(path, error) == file.digest.bytes) return;
+    if (type_behind(path) == std::filesystem::file_type::regular) {
+        const std::uintmax_t size = std::filesystem::file_size(path, error);
+        if (error) throw ReadFailure(path, error.message(), "examine");
+        if (size == file.digest.bytes) return;
+    }
     throw Error(ErrorCode::io,
                 fmt::format("{}: is not the file of {} bytes that was written: start anew with --overwrite",
                             path.string(), file.digest.bytes));

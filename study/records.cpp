@@ -293,12 +293,8 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
       flushed_(std::chrono::steady_clock::now()) {
     create_folders(path_.parent_path());
     // Records come with their series, and never after them.
-    std::error_code error;
-    const bool is_file =
-        std::filesystem::is_regular_file(std::filesystem::symlink_status(series_path_, error));
-    if (is_file && !std::filesystem::exists(path_, error) &&
-        !begins_packed(read_beginning(series_path_, 2)) &&
-        std::filesystem::file_size(series_path_, error) > 0)
+    if (type_at(series_path_) == std::filesystem::file_type::regular && !is_there(path_) &&
+        !begins_packed(read_beginning(series_path_, 2)) && !read_beginning(series_path_, 1).empty())
         require_absent(series_path_, "a sweep");
     // What they are cut to is no file that somebody else has put a link to here.
     constexpr int kOwn = O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW;

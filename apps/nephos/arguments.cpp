@@ -11,6 +11,7 @@
 
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/warnings.h"
@@ -195,8 +196,7 @@ Scene load_scene(const SceneArguments& arguments, SceneUse use) {
 }
 
 void refuse_to_replace(const std::string& from, const std::string& to) {
-    std::error_code error;
-    if (!from.empty() && !to.empty() && std::filesystem::equivalent(from, to, error))
+    if (is_same_place(from, to))
         throw Error(ErrorCode::usage,
                     to + ": is the file that is read: expected the name of another one to write");
 }

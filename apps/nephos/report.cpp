@@ -17,6 +17,7 @@
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
 #include "core/folder_names.h"
+#include "core/paths.h"
 #include "simulation/layer_simulation.h"
 
 namespace nephos {
@@ -40,9 +41,8 @@ void require_none_of_sweep(const std::filesystem::path& folder, const std::files
     std::vector<std::filesystem::path> files{folder / "timing.csv"};
     for (const std::string& name : names_in_folder(folder / "shards"))
         files.push_back(folder / "shards" / name);
-    std::error_code error;
     for (const std::filesystem::path& file : files)
-        if (std::filesystem::equivalent(file, out, error)) require_absent(out, "`nephos report`");
+        if (is_same_place(file, out)) require_absent(out, "`nephos report`");
 }
 
 int report(const ReportArguments& a) {

@@ -15,6 +15,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/folder_names.h"
+#include "core/paths.h"
 #include "core/text.h"
 #include "density/export/containers.h"
 #include "density/grid_names.h"
@@ -240,10 +241,9 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
 void refuse_own_folder(const ExportOptions& options, const std::vector<ExportSequence>& sequences) {
     for (const ExportSequence& s : sequences) {
         for (const SourceFrame& frame : s.frames) {
-            std::error_code error;
             const std::filesystem::path folder =
                 frame.file.has_parent_path() ? frame.file.parent_path() : ".";
-            if (std::filesystem::equivalent(folder, options.folder, error))
+            if (is_same_place(folder, options.folder))
                 throw Error(ErrorCode::usage, frame.file.string() +
                                                   ": lies in the folder that is written to: expected "
                                                   "another one as --out");

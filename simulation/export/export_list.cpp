@@ -12,6 +12,7 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/folder_names.h"
+#include "core/paths.h"
 #include "simulation/checked_json.h"
 #include "simulation/manifest.h"
 #include "simulation/sealed_json.h"
@@ -135,9 +136,7 @@ void claim(const std::filesystem::path& folder) {
 }  // namespace
 
 bool is_export_folder(const std::filesystem::path& folder) {
-    std::error_code error;
-    const std::filesystem::path list = folder / "export.json";
-    return is_there(list) && std::filesystem::is_regular_file(list, error);
+    return type_behind(folder / "export.json") == std::filesystem::file_type::regular;
 }
 
 ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences)

@@ -276,6 +276,32 @@ class Faults(Case):
         result = self.call("verify", "run", status=3, env=self.failing("open EIO 1 1", "run/density"))
         self.assertIn("none  listing   run/density: cannot read: Input/output error", result.stdout)
 
+    def test_a_file_that_cannot_be_examined_is_not_lost(self):
+        """Scenes and reports that would be written over, a table of the user's own, private files: whichever stat fails."""
+        scene = (self.folder / "mine.toml")
+        text = pathlib.Path(self.scene).read_bytes()
+        (self.folder / "report.txt").write_text("EGLL 211350Z 24012KT 9999 FEW020 14/08 Q1017\n", encoding="utf-8")
+        (self.folder / "sweep").mkdir()
+        rows = b"my,own\nrows,of\na,user"
+        for number in range(1, 12):
+            for arguments, path, file, content in (
+                    (("state", "mine.toml", "--steps", "1", "--out", "mine.toml"), "mine.toml", scene, text),
+                    (("metar", "@report.txt", "--scene", "report.txt", "-q"), "report.txt", self.folder / "report.txt",
+                     b"EGLL 211350Z 24012KT 9999 FEW020 14/08 Q1017\n"),
+                    (("sweep", self.scene, "--axis", "field.background.ext=0.1", "--replicates", "1", "--steps", "20", "--out", "sweep", "-q"),
+                     "timing.csv", self.folder / "sweep/timing.csv", rows)):
+                file.write_bytes(content)
+                result = subprocess.run([NEPHOS, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True, timeout=120,
+                                        env=self.failing(f"stat EIO {number} 1", path))
+                self.assertIn(result.returncode, (2, 3), (arguments, number, result.stderr))
+                self.assertEqual(file.read_bytes(), content, (arguments, number))
+            private = self.folder / "private.vdb"
+            private.write_bytes(b"")
+            private.chmod(0o600)
+            subprocess.run([NEPHOS, "state", self.scene, "--steps", "1", "--out", private, "-q"], cwd=self.folder, capture_output=True, timeout=120,
+                           env=self.failing(f"stat EIO {number} 1", "private.vdb"), check=False)
+            self.assertEqual(private.stat().st_mode & 0o777, 0o600, number)
+
     def test_rows_are_not_appended_to_what_a_link_leads_to(self):
         process = self.started("out")
         process.send_signal(signal.SIGINT)

@@ -169,6 +169,22 @@ class Keeping(Case):
             self.call(*command, *more, "--out", folder, "--resume")
             self.call("verify", folder)
 
+    def test_layers_behind_links(self):
+        """The folder of a layer on another disk: what others have there is as safe as in the run's own, and no file too many."""
+        frames = LAYERED.replace("enabled = false", "count = 2") + "[density]\nper_layer = true\n"
+        scene = self.write("layered.toml", frames)
+        for name in ("a", "b"):
+            (self.folder / name / "density").mkdir(parents=True)
+            (self.folder / name / "density/low").symlink_to("../../shared")
+        (self.folder / "shared").mkdir()
+        self.call("run", scene, "--no-render", "--out", "a")
+        self.assertEqual(len(list((self.folder / "shared").iterdir())), 2)
+        self.call("verify", "a")
+        self.kept("shared", 2, "run", scene, "--seed", 9, "--no-render", "--out", "b", says="but no manifest.json")
+        self.call("run", scene, "--no-render", "--out", "a", "--overwrite", "--set", "frames.count=1")
+        self.assertEqual(len(list((self.folder / "shared").iterdir())), 1)
+        self.call("verify", "a")
+
     def test_a_frame_that_is_not_what_was_written(self):
         self.call(*self.plain, "--out", "out")
         frame = self.folder / "out/density/tiny_0001.vdb"
