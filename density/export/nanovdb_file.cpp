@@ -2,6 +2,8 @@
 #include "density/export/nanovdb_file.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <cstring>
 #include <istream>
 #include <new>
@@ -21,7 +23,6 @@
 #pragma GCC diagnostic ignored "-Wextra"
 #pragma GCC diagnostic ignored "-Wall"
 #include <nanovdb/util/IO.h>
-#include <nanovdb/util/NanoToOpenVDB.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 #pragma GCC diagnostic pop
 
@@ -85,37 +86,67 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
 
 namespace {
 
-// The float grid of a file, of values as they are or quantised. (The conversion of a handle would compile all kinds of grids.)
-FloatGrid::Ptr float_grid_of(const nanovdb::GridHandle<>& handle) {
-    if (const auto* plain = handle.grid<float>()) return nanovdb::nanoToOpenVDB(*plain);
-    if (const auto* fp8 = handle.grid<nanovdb::Fp8>()) return nanovdb::nanoToOpenVDB(*fp8);
-    if (const auto* fp16 = handle.grid<nanovdb::Fp16>()) return nanovdb::nanoToOpenVDB(*fp16);
-    return nullptr;
+using openvdb::CoordBBox;
+
+openvdb::Coord coordinates(const nanovdb::Coord& at) { return {at[0], at[1], at[2]}; }
+
+void require_inside(const CoordBBox& extent, const CoordBBox& active) {
+    if (!extent.isInside(active)) throw std::runtime_error("it has voxels outside of its box");
 }
 
-// In the child: the blocks of the only grid of an open file.
+void send_tiles(SandboxWriter& writer, const CoordBBox& extent, const openvdb::Coord& origin, int edge,
+                float value) {
+    const CoordBBox box = CoordBBox::createCube(origin, edge);
+    require_inside(extent, box);
+    for (int z = box.min().z(); z <= box.max().z(); z += kBlock)
+        for (int y = box.min().y(); y <= box.max().y(); y += kBlock)
+            for (int x = box.min().x(); x <= box.max().x(); x += kBlock) send_tile(writer, {x, y, z}, value);
+}
+
+// Sends the blocks below a node. (The library's conversion to OpenVDB would do, but for its threads: a child that was forked
+// should start none.)
+template <class Node>
+void send_node(SandboxWriter& writer, const CoordBBox& extent, const Node& node) {
+    if constexpr (Node::LEVEL == 0) {
+        std::array<float, kBlockVoxels> values;
+        for (std::uint32_t n = 0; n < kBlockVoxels; ++n) values[n] = node.getValue(n);
+        for (auto active = node.valueMask().beginOn(); active; ++active)
+            require_inside(extent, CoordBBox::createCube(coordinates(node.offsetToGlobalCoord(*active)), 1));
+        send_leaf(writer, coordinates(node.origin()), values.data());
+    } else {
+        for (auto child = node.beginChild(); child; ++child) send_node(writer, extent, *child);
+        constexpr int kEdge = int(Node::ChildNodeType::DIM);
+        for (auto tile = node.beginValueOn(); tile; ++tile)
+            send_tiles(writer, extent, coordinates(node.offsetToGlobalCoord(tile.pos())), kEdge, *tile);
+    }
+}
+
+template <class Build>
+bool send_grid_of(const nanovdb::GridHandle<>& handle, const CoordBBox& extent, SandboxWriter& writer) {
+    const nanovdb::NanoGrid<Build>* grid = handle.grid<Build>();
+    if (grid == nullptr) return false;
+    const auto& root = grid->tree().root();
+    for (auto child = root.beginChild(); child; ++child) send_node(writer, extent, *child);
+    for (auto tile = root.beginValueOn(); tile; ++tile) {
+        const openvdb::Coord origin = coordinates(root.data()->tile(tile.pos())->origin());
+        send_tiles(writer, extent, origin, int(nanovdb::NanoUpper<Build>::DIM), *tile);
+    }
+    return true;
+}
+
+// In the child: the blocks of the only grid of an open file, of values as they are or quantised.
 void send_grid(int file, const Extent& extent, SandboxWriter& writer) {
     __gnu_cxx::stdio_filebuf<char> buffer(file, std::ios::in | std::ios::binary);
     std::istream stream(&buffer);
     stream.exceptions(std::ios::badbit);  // with the system's error
     const auto handles = nanovdb::io::readGrids(stream);
-    const FloatGrid::Ptr grid = handles.size() == 1 ? float_grid_of(handles.front()) : nullptr;
-    if (grid == nullptr) throw std::runtime_error("it holds no float grid of 32, 16 or 8 bits");
-    const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
-    const openvdb::Coord last(extent.x - 1, extent.y - 1, extent.z - 1);
-    if (!box.empty() && !openvdb::CoordBBox(openvdb::Coord(0), last).isInside(box))
-        throw std::runtime_error("it has voxels outside of its box");
-    for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf)
-        send_leaf(writer, leaf->origin(), leaf->buffer().data());
-    auto tile = grid->tree().cbeginValueOn();
-    tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) {
-        const openvdb::CoordBBox block = tile.getBoundingBox();
-        for (int z = block.min().z(); z <= block.max().z(); z += kBlock)
-            for (int y = block.min().y(); y <= block.max().y(); y += kBlock)
-                for (int x = block.min().x(); x <= block.max().x(); x += kBlock)
-                    send_tile(writer, {x, y, z}, *tile);
-    }
+    const CoordBBox box(openvdb::Coord(0), openvdb::Coord(extent.x - 1, extent.y - 1, extent.z - 1));
+    const auto is_sent = [&](const nanovdb::GridHandle<>& handle) {
+        return send_grid_of<float>(handle, box, writer) || send_grid_of<nanovdb::Fp8>(handle, box, writer) ||
+               send_grid_of<nanovdb::Fp16>(handle, box, writer);
+    };
+    if (handles.size() != 1 || !is_sent(handles.front()))
+        throw std::runtime_error("it holds no float grid of 32, 16 or 8 bits");
     send_end(writer);
 }
 

@@ -80,6 +80,8 @@ void send_all(int fd, const void* data, std::size_t size) {
     try {
         std::vector<int> open(kept.begin(), kept.end());
         open.push_back(fd);
+        // A child before this one that was ended has left the position of the files where it was.
+        for (const int file : kept) ::lseek(file, 0, SEEK_SET);
         confine(parent, open, limits.memory_bytes, limits.seconds);
         SandboxWriter writer(fd);
         child(writer);
@@ -371,24 +373,6 @@ std::string too_large(std::size_t memory_bytes) {
            " MiB of memory that are allowed";
 }
 
-namespace {
-
-// Returns the bytes of the character that a text begins with; 0 where they are no UTF-8.
-std::size_t utf8_length(std::string_view text) {
-    const auto byte = [&](std::size_t n) { return unsigned(static_cast<unsigned char>(text[n])); };
-    const unsigned first = byte(0);
-    if (first < 0x80) return 1;
-    const std::size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
-    if (first < 0xC2 || first > 0xF4 || text.size() < length) return 0;
-    for (std::size_t n = 1; n < length; ++n)
-        if ((byte(n) & 0xC0) != 0x80) return 0;
-    const bool is_overlong = (first == 0xE0 && byte(1) < 0xA0) || (first == 0xF0 && byte(1) < 0x90);
-    const bool is_none = (first == 0xED && byte(1) > 0x9F) || (first == 0xF4 && byte(1) > 0x8F);
-    return is_overlong || is_none ? 0 : length;
-}
-
-}  // namespace
-
 std::string clamp_message(std::string_view text, std::size_t length) {
     std::string result;
     for (char c : text.substr(0, length)) {
@@ -402,10 +386,10 @@ std::string clamp_message(std::string_view text, std::size_t length) {
 std::string clamp_text(std::string_view text, std::size_t length) {
     std::string result;
     for (std::size_t at = 0; at < text.size();) {
-        const std::size_t bytes = utf8_length(text.substr(at));
-        if (result.size() + std::max<std::size_t>(bytes, 1) > length) return result + "...";
-        result += bytes == 0 ? std::string_view("?") : text.substr(at, bytes);
-        at += std::max<std::size_t>(bytes, 1);
+        const Character next = character_at(text, at);
+        if (result.size() + next.bytes.size() > length) return result + "...";
+        result += next.valid ? next.bytes : std::string_view("?");
+        at += next.bytes.size();
     }
     return result;
 }

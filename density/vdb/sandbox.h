@@ -71,9 +71,10 @@ class SandboxReader {
 };
 
 // Runs `child` in a child process and `parent` in this one, on the values that the child sends. The child may do nothing
-// but compute, send, and read `kept`, descriptors that are open already (confinement.h). When `child` throws, dies or
-// exceeds a limit, throws Error(io) that names `subject`, `parser` (the library that reads) and the reason, printable and
-// at most 300 characters long. After a restart `parent` is called again and must discard its earlier results.
+// but compute, send, and read `kept`, descriptors of files that are open already, from their beginning (confinement.h).
+// When `child` throws, dies or exceeds a limit, throws Error(io) that names `subject`, `parser` (the library that reads)
+// and the reason, printable and at most 300 characters long. After a restart `parent` is called again and must discard
+// its earlier results.
 void run_sandboxed(const std::filesystem::path& subject, std::string_view parser, const SandboxLimits& limits,
                    std::span<const int> kept, const std::function<void(SandboxWriter&)>& child,
                    const std::function<void(SandboxReader&)>& parent);

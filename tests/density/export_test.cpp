@@ -289,6 +289,27 @@ TEST(Containers, NanoVdbHoldsTheSameVoxels) {
               0.9 * double(std::filesystem::file_size(folder / "v.nvdb")));
 }
 
+// Uniform blocks are tiles of two sizes; beside the box there may be none.
+TEST(Containers, NanoVdbHoldsUniformBlocks) {
+    const TemporaryFolder folder;
+    const Extent extent{136, 128, 136};
+    std::vector<float> values(extent.cells(), 0.5f);
+    for (std::size_t n = 0; n < values.size(); ++n)
+        if (n % 136 >= 128) values[n] = n / (136 * 128) < 8 ? 0.25f : float(n % 7) / 8;
+    const DensityGrid grid = DensityGrid::from_dense(values, extent, {{0, 0, 0}, 10});
+    for (const NanoQuantise quantise : {NanoQuantise::none, NanoQuantise::fp16}) {
+        write_nanovdb(folder / "t.nvdb", grid, NanoCodec::zip, quantise);
+        const std::vector<float> read = read_nanovdb(folder / "t.nvdb", extent, grid.placement()).to_dense();
+        ASSERT_EQ(read.size(), values.size());
+        float worst = 0;
+        for (std::size_t n = 0; n < values.size(); ++n)
+            worst = std::max(worst, std::abs(read[n] - values[n]));
+        EXPECT_LE(worst, quantise == NanoQuantise::none ? 0.0f : 1e-5f);
+    }
+    for (const Extent& less : {Extent{135, 128, 136}, Extent{136, 127, 136}, Extent{136, 128, 64}})
+        EXPECT_THROW(read_nanovdb(folder / "t.nvdb", less, grid.placement()), Error);
+}
+
 // Every voxel of every level is in a brick, its neighbours are in the border, and empty bricks have no data.
 TEST(Bricks, AreReadBackAndHaveTheirNeighbours) {
     const TemporaryFolder folder;

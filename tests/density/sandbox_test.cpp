@@ -5,6 +5,7 @@
 
 #include "density/vdb/sandbox.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -25,6 +26,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 
 namespace nephos {
@@ -134,6 +136,34 @@ TEST(Sandbox, EndsWhatStaysAfterItsResult) {
     EXPECT_EQ(error_of(closed, limits), "subject.vdb: cannot read: it takes longer than allowed");
     const auto elapsed = std::chrono::steady_clock::now() - start;
     EXPECT_LT(std::chrono::duration<double>(elapsed).count(), 10.0);
+}
+
+// A child that waits for a lock that a thread of its parent held is ended after 8 s. The next one shares the descriptor,
+// whose position the first has moved.
+TEST(Sandbox, StartsAgainAtTheBeginningOfItsFile) {
+    const Descriptor file(::memfd_create("cumulus", MFD_CLOEXEC));
+    ASSERT_EQ(::write(file.get(), "cumulus", 7), 7);
+    const int kept[] = {file.get()};
+    int children = 0;  // that have ended; a child has what it was at the fork
+    std::string text;
+    run_sandboxed(
+        "subject.vdb", "OpenVDB", {}, kept,
+        [&](SandboxWriter& writer) {
+            std::string read(16, ' ');
+            const ssize_t size = ::read(file.get(), read.data(), read.size());
+            if (children == 0) ::pause();
+            writer.text(read.substr(0, std::size_t(std::max<ssize_t>(size, 0))));
+        },
+        [&](SandboxReader& reader) {
+            try {
+                text = reader.text();
+            } catch (...) {
+                ++children;
+                throw;
+            }
+        });
+    EXPECT_EQ(children, 1);
+    EXPECT_EQ(text, "cumulus");
 }
 
 // Ctrl-Z, or a batch system that suspends a job: what passes then is nobody's time.
