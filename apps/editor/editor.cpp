@@ -86,9 +86,9 @@ void take_new_results(Editor& editor, Clock::time_point& taken) {
 // Returns the text of a scene with what is being typed in it.
 std::string text_to_keep(const Editor& editor, const OpenScene& scene) {
     const std::string& text = scene.document->text();
-    if (&scene != &editor || !editor.unfinished || scene.document->has_syntax_error()) return text;
+    if (&scene != &editor || !editor.typed || scene.document->has_syntax_error()) return text;
     try {
-        return editor.unfinished(text);
+        return with_value(text, editor.typed->path, editor.typed->value);
     } catch (const Error&) {  // the text was changed meanwhile, and has no such place any more
         return text;
     }
@@ -199,13 +199,14 @@ void draw_interface(Editor& editor) {
     const float scale = ImGui::GetFontSize() / 15;
     editor.controls.last = std::move(editor.controls.now);
     editor.controls.now.clear();
-    editor.unfinished = nullptr;
+    if (editor.typed) editor.typed->is_drawn = false;
     shortcuts(editor);
     menu_bar(editor);
     layout(editor, scale);
     dialogs(editor);
+    take_typed_value(editor);
     finish_recorded_value(editor);
-    // What is dragged, or typed into one field, is one step.
+    // Keeps what is dragged, or typed into one field, one step of undo.
     if (!ImGui::IsAnyMouseDown() && !ImGui::IsAnyItemActive()) editor.document->end_merging();
 }
 
@@ -315,7 +316,7 @@ std::unique_ptr<SceneDocument> first_document(Editor& editor) {
 std::string kept_edits(Editor& editor) {
     bool any = false;
     for_each_scene(editor, [&](const OpenScene& scene) { any |= scene.document->is_modified(); });
-    if (!any && !editor.unfinished) return {};
+    if (!any && !editor.typed) return {};
     const std::string failures = autosave_all(editor);
     if (!failures.empty()) return "; unsaved edits could not be kept: " + failures;
     return "; unsaved edits are kept, and are offered at the next start with this scene";

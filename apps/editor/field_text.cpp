@@ -377,6 +377,11 @@ std::optional<std::string> unfinished_text(const char* label) {
     return text_of_field(last.taken);
 }
 
+bool forget_unfinished_text() {
+    LastField& last = last_field();
+    return std::exchange(last.id, 0) != 0 && last.taken != last.given;
+}
+
 bool input_lines(const char* label, std::string& text, const ImVec2& size, ImGuiInputTextFlags flags) {
     std::string lines = without_returns(text);
     const std::string before = lines;

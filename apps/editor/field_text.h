@@ -36,6 +36,8 @@ bool input_value(const char* label, std::string& text, ImGuiInputTextFlags flags
 
 // Returns what was typed into a field of input_value() that still has the caret; nothing where that is what it began with.
 std::optional<std::string> unfinished_text(const char* label);
+// Forgets it; returns whether there was any.
+bool forget_unfinished_text();
 
 // As ImGui::InputTextMultiline(), but returns whether the text was changed. Lines keep their ends; what is added has those of
 // the first line.

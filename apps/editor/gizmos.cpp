@@ -29,7 +29,7 @@ TextPath with(const TextPath& path, const char* name) {
 
 std::string number_of(const Editor& editor, double metres) { return number_text(tidy_m(editor, metres), 9); }
 
-// What a handle makes of a vector: it moves one of its numbers, and the others keep their digits.
+// Holds a vector of which a handle has moved one number; the others keep their digits.
 struct Moved {
     Vec3 value{};
     int axis = 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <imgui.h>
 
@@ -89,20 +90,10 @@ void value_row(Editor& editor, const ValueRow& row) {
     bool unfinished = false;
     if (const std::optional<std::string> value = edit_value(editor, row, unfinished)) {
         const bool dragging = ImGui::IsItemActive() || ImGui::IsMouseDown(ImGuiMouseButton_Left);
-        if (unfinished) {
-            editor.unfinished = [path = row.path, typed = *value](const std::string& text) {
-                return with_value(text, path, typed);
-            };
-        } else if (row.key.name == "name" && row.path.size() > 1 && value->starts_with('"')) {
-            const Node typed = parsed_value(*value);
-            const auto renamed = [&](const std::string& text) {
-                return with_new_name(text, editor.document->values(), row.path, typed.text,
-                                     names_from_files(editor));
-            };
-            change_text(editor, renamed, "Rename to " + typed.text);
-        } else {
-            set_value(editor, row.path, *value, dragging, form_of(row.key));
-        }
+        if (unfinished)
+            editor.typed = {row.path, &row.key, *value, true};
+        else
+            take_value(editor, row.path, row.key, *value, dragging);
     }
     editor.controls.note(name);
     ImGui::TableNextColumn();
@@ -230,6 +221,24 @@ void found_rows(Editor& editor, const Section& section, const TextPath& path) {
 }
 
 }  // namespace
+
+void take_value(Editor& editor, const TextPath& path, const Key& key, const std::string& value,
+                bool dragging) {
+    if (key.name != "name" || path.size() < 2 || !value.starts_with('"'))
+        return set_value(editor, path, value, dragging, form_of(key));
+    const Node typed = parsed_value(value);
+    const auto renamed = [&](const std::string& text) {
+        return with_new_name(text, editor.document->values(), path, typed.text, names_from_files(editor));
+    };
+    change_text(editor, renamed, "Rename to " + typed.text);
+}
+
+void take_typed_value(Editor& editor) {
+    if (!editor.typed || editor.typed->is_drawn) return;
+    const Editor::TypedValue typed = *std::exchange(editor.typed, std::nullopt);
+    // A field that was left by Enter or Escape has no text any more.
+    if (forget_unfinished_text()) take_value(editor, typed.path, *typed.key, typed.value);
+}
 
 std::size_t models_from_files(const Editor& editor) {
     const std::optional<Scene>& scene = editor.document->scene();

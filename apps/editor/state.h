@@ -201,8 +201,14 @@ struct Editor : OpenScene {
     std::vector<std::filesystem::path> folder_scenes;
     std::string message;  // in the status bar
     bool message_is_bad = false, message_goes_on = false;  // behind what was refused
-    // What is typed into a field that has the caret, and is kept with the edits; may be empty.
-    TextEdit unfinished;
+    // Holds what is typed into a field that has the caret: it is kept with the edits, and taken where the field is drawn no more.
+    struct TypedValue {
+        TextPath path;
+        const Key* key = nullptr;
+        std::string value;  // as TOML
+        bool is_drawn = true;
+    };
+    std::optional<TypedValue> typed;
     // A number of a wind that is recorded, as long as its field has the mouse or the caret: a key frame takes its place when it is
     // recorded, and the field goes with it.
     struct RecordedValue {
@@ -235,6 +241,11 @@ bool change_text(Editor& editor, const TextEdit& edit, const std::string& what,
                  const std::string& merge = {});
 void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging = false,
                NumberForm form = NumberForm::any);
+// Gives a key the value of its field; a name is changed where it is used, too.
+void take_value(Editor& editor, const TextPath& path, const Key& key, const std::string& value,
+                bool dragging = false);
+// Takes what was typed into a field that is not drawn any more, as in a window that became too small for its panel.
+void take_typed_value(Editor& editor);
 // Applies a wind that was typed or dragged while it is recorded, once its field is left.
 void finish_recorded_value(Editor& editor);
 // Several keys of a table as one step of the history.

@@ -325,7 +325,6 @@ class Safety(Case):
         scene.write_text(MODELS[:MODELS.index("[[model]]")] + 'models = "m.toml"\n' + MODELS[MODELS.index("[[sky]]"):], encoding="utf-8")
         self.edit(scene, script="wait 1\nexpect-control problems\n")
 
-
         def bring_models():
             while not (self.folder / "ready.png").exists():
                 time.sleep(0.1)
@@ -461,6 +460,16 @@ class Safety(Case):
                 self.assertEqual(autosave.read_text(encoding="utf-8"), kept)
                 autosave.unlink()
                 ready.unlink()
+
+    def test_a_window_too_small_for_a_field_takes_no_text_away(self):
+        """What is typed when the panel is drawn no more counts as if the field had been left; a name is followed by its users."""
+        for select, key, size in (("click scene", "name", "300 300"), ("click model\nclick model[0]", "model[0].name", "300 800"),
+                                  ("click scene", "name", "1280 60")):
+            scene = self.models()
+            self.edit(scene, script=f"wait-step 1\n{select}\nclick \"tab Properties\"\nwait 0.2\nclick {key}\nkey END\ntype xyz\nwait 0.2\n"
+                                    f"resize {size}\nwait 0.5\nkey CTRL+S\nwait 0.5\n")
+            name = "models" if key == "name" else "bank"
+            self.assertEqual(scene.read_text(encoding="utf-8"), MODELS.replace(f'"{name}"', f'"{name}xyz"'), size)
 
     def test_a_picture_of_a_scene_with_problems(self):
         """The window with what is wrong, and status 2 or 3; a script does not wait for a picture for ever."""
