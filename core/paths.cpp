@@ -73,7 +73,9 @@ std::filesystem::file_type type_at(const std::filesystem::path& path) {
 
 std::filesystem::file_type type_behind(const std::filesystem::path& path) {
     std::error_code error;
-    return known(path, std::filesystem::status(path, error).type(), error);
+    const auto type = std::filesystem::status(path, error).type();
+    if (error == std::errc::too_many_symbolic_link_levels) return std::filesystem::file_type::not_found;
+    return known(path, type, error);
 }
 
 bool stands_there(const std::filesystem::path& path) {
@@ -89,6 +91,17 @@ bool is_same_place(const std::filesystem::path& a, const std::filesystem::path& 
     if (error && error != std::errc::no_such_file_or_directory)
         throw ReadFailure(a, error.message(), "examine");
     return same && !error;
+}
+
+std::vector<std::string> names_in_folder(const std::filesystem::path& folder) {
+    std::vector<std::string> names;
+    std::error_code error;
+    std::filesystem::directory_iterator at(folder, error), end;
+    if (error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory) return names;
+    for (; !error && at != end; at.increment(error)) names.push_back(at->path().filename().string());
+    if (error) throw ReadFailure(folder, error.message());
+    std::ranges::sort(names);
+    return names;
 }
 
 std::filesystem::path normal_path(const std::filesystem::path& path) {

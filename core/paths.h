@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Folders that outlive a power cut, and paths without "..". Thread-safe.
+// Folders that outlive a power cut and what they hold, what stands at a path, and paths without "..". Thread-safe.
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 namespace nephos {
 
@@ -11,7 +13,7 @@ namespace nephos {
 // later are not lost with their folder. Does nothing where the folder is there. Throws Error(io) naming `folder`.
 void create_folders(const std::filesystem::path& folder);
 
-// Return what stands at a path, links not followed or followed; file_type::not_found for nothing. Throw ReadFailure where the system
+// Return what stands at a path, links not followed or followed; file_type::not_found for nothing, and behind links in a circle. Throw ReadFailure where the system
 // cannot say: then nothing may be taken for missing, or for a file of another kind.
 std::filesystem::file_type type_at(const std::filesystem::path& path);
 std::filesystem::file_type type_behind(const std::filesystem::path& path);
@@ -21,6 +23,10 @@ bool stands_there(const std::filesystem::path& path);
 
 // Returns whether two paths, links followed, lead to one file or folder; false where either is not there. Throws as these.
 bool is_same_place(const std::filesystem::path& a, const std::filesystem::path& b);
+
+// Returns the names of what a folder holds, sorted; none where there is no folder. Throws ReadFailure where it cannot be read to
+// its end: what it holds is then not known, and none of it may be taken for missing.
+std::vector<std::string> names_in_folder(const std::filesystem::path& folder);
 
 // Returns the path without "." and "..": by its text where that leads to the same file as the system's way, otherwise, where
 // ".." goes back through a link, with the links of its folder resolved. Where nothing is there it is by its text.

@@ -16,7 +16,6 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/file_stamp.h"
-#include "core/folder_names.h"
 #include "core/paths.h"
 #include "scenes/format/writer.h"
 #include "simulation/manifest.h"

@@ -15,7 +15,7 @@
 #include "core/descriptor.h"
 #include "core/digest.h"
 #include "core/error.h"
-#include "core/folder_names.h"
+#include "core/paths.h"
 #include "simulation/run_listing.h"
 #include "simulation/sealed_json.h"
 #include "simulation/statistics_file.h"
@@ -31,14 +31,10 @@ void add_extra_files(const RunListing& run, const std::set<std::string>& listed,
                      const std::filesystem::path& part, std::vector<std::filesystem::path>& extra) {
     for (const std::string& name : names_in_folder(run.folder / part)) {
         const std::filesystem::path path = part / name;
-        std::error_code error;
-        const auto type = std::filesystem::symlink_status(run.folder / path, error).type();
-        if (type == std::filesystem::file_type::none)
-            throw ReadFailure(run.folder / path, error.message(), "examine");
-        if (type == std::filesystem::file_type::directory) {
+        constexpr auto kFolder = std::filesystem::file_type::directory;
+        if (type_at(run.folder / path) == kFolder) {
             add_extra_files(run, listed, path, extra);
-        } else if (!std::filesystem::is_directory(run.folder / path, error) &&
-                   !listed.contains(path.generic_string())) {
+        } else if (type_behind(run.folder / path) != kFolder && !listed.contains(path.generic_string())) {
             extra.push_back(path);
         }
     }

@@ -54,6 +54,8 @@ BitPlane plane_of(const Extent& extent, double threshold, Value&& value) {
     return plane;
 }
 
+// Limits a mask seen from above: each of its columns is gone over for each random field that the organisation of its clouds is
+// compared with.
 constexpr std::uint64_t kMostColumns = std::uint64_t(1) << 28;
 
 CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& options) {
@@ -68,7 +70,6 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
     if (const int longest = std::max({extent.x, extent.y, extent.z}); longest > kMaxExtent)
         fail(ErrorCode::io, path,
              fmt::format("has {} voxels along an axis; at most {} can be read", longest, kMaxExtent));
-    // Columns are gone over for each random field that the organisation of the clouds is compared with.
     if (std::uint64_t(extent.x) * std::uint64_t(extent.y) > kMostColumns)
         fail(ErrorCode::io, path,
              fmt::format("has {} x {} columns of voxels; at most {} can be read", extent.x, extent.y,
@@ -144,7 +145,7 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
     const double size = cell_size(path, options);
     require_no_height(path, options);
     // Deflate makes at most 1,032 bytes of one, and a pixel has at least a bit: a header that claims more lies.
-    constexpr std::uint64_t kMostPixels = kMostColumns, kPixelsOfByte = 8 * 1040;
+    constexpr std::uint64_t kPixelsOfByte = 8 * 1040;
     constexpr std::uint64_t kMostBytes = std::uint64_t(1) << 30;
     require_regular_file(path);
     std::error_code error;
@@ -163,11 +164,11 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
         PNG_IMAGE_FLAG_16BIT_sRGB;  // else 16 bits are taken for linear light, and 20,000 of 65,535 for 149 of 255
     const std::uint64_t pixels_claimed = std::uint64_t(image.width) * image.height;
     if (image.width > unsigned(kMaxExtent) || image.height > unsigned(kMaxExtent) ||
-        pixels_claimed > kMostPixels) {
+        pixels_claimed > kMostColumns) {
         png_image_free(&image);
         fail(ErrorCode::usage, path,
              fmt::format("has {} x {} pixels; at most {} along a side and {} in all can be read", image.width,
-                         image.height, kMaxExtent, kMostPixels));
+                         image.height, kMaxExtent, kMostColumns));
     }
     if (pixels_claimed > bytes.size() * kPixelsOfByte) {
         png_image_free(&image);

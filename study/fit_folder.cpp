@@ -209,9 +209,7 @@ std::optional<FitResult> run_fit(const FitOptions& given, const SweepJob& job,
 
 std::string failed_runs_text(const FitResult& result) {
     return fmt::format(
-        "{} failed: failures.csv of each wave has the command that repeats each, --retry-failed runs again "
-        "what "
-        "failed",
+        "{} failed: failures.csv of each wave has the command that repeats each, --retry-failed repeats all",
         result.failed == 1 ? "1 run" : std::to_string(result.failed) + " runs");
 }
 

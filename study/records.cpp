@@ -161,7 +161,7 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
         }
     }
     check_reading(stream, path);
-    // What an append that was cut short left has no end of a line.
+    // An append that was cut short leaves no end of a line.
     if (torn && !cut_short)
         damaged_end = fmt::format("{}: the record at byte {} is damaged", path.string(), bytes);
     // Series are written before the records that name them: fewer are damage, and not to be filled with zeros. Their size is

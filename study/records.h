@@ -40,7 +40,7 @@ std::string record_line(const PlannedRun& run, const RunResult& result, std::uin
                         std::string_view series);
 std::string failure_line(const PlannedRun& run, std::string_view message);
 
-// What the records are read for: it decides what helps against those of another version, and against files that cannot be
+// Says what the records are read for, which decides what helps against those of another version, and against files that cannot be
 // read.
 enum class RecordsFor {
     running,  // by a command that has --overwrite

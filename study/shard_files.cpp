@@ -16,7 +16,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "core/folder_names.h"
+#include "core/paths.h"
 
 namespace nephos {
 namespace {

@@ -13,7 +13,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
-#include "core/folder_names.h"
+#include "core/paths.h"
 #include "core/text.h"
 
 namespace nephos {

@@ -16,7 +16,6 @@
 #include "apps/nephos/study_commands.h"
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
-#include "core/folder_names.h"
 #include "core/paths.h"
 #include "simulation/layer_simulation.h"
 

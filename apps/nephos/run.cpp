@@ -278,8 +278,8 @@ int run(const RunArguments& a) {
                    "(--checkpoint leaves one)");
     if (wants_frames && report.complete && report.frames == 0 && !a.work.quiet)
         print_note(
-            fmt::format("no frame lies in these steps (frames.start_s, and frames.count = {}): "
-                        "--statistics-only says that none is wanted",
+            fmt::format("these steps have no frame: frames.start_s and frames.count = {} lie elsewhere "
+                        "(--statistics-only where none is wanted)",
                         frames_of_scene));
     if (report.skipped && !a.work.quiet) print_note(report.folder.string() + ": is complete already");
     if (a.work.json) {

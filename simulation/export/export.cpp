@@ -14,7 +14,6 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
-#include "core/folder_names.h"
 #include "core/paths.h"
 #include "core/text.h"
 #include "density/export/containers.h"

@@ -11,7 +11,6 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "core/folder_names.h"
 #include "core/paths.h"
 #include "simulation/checked_json.h"
 #include "simulation/manifest.h"

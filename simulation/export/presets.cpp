@@ -138,9 +138,8 @@ constexpr const char* kUnity =
     "1. Import {FIRST} as a Texture 2D with Texture Shape 3D, Columns {COLUMNS}, Rows {ROWS}; no mip maps, "
     "no sRGB, Wrap\n"
     "   Mode Clamp, Format R 8. Slices are already in Unity's order: x east, y up, z north, left-handed.\n"
-    "2. Place a Local Volumetric Fog or your own ray marcher from min_m of the sidecar to {TEXTURE_END}; "
-    "metres "
-    "are units.\n"
+    "2. Place a Local Volumetric Fog or your own ray marcher, in metres, from min_m of the sidecar to "
+    "{TEXTURE_END}.\n"
     "3. Extinction per metre = texture * {SCALE} * {EXTINCTION}.\n"
     "The border of zeros lets clamped addresses read nothing.\n";
 

@@ -9,7 +9,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "core/folder_names.h"
+#include "core/paths.h"
 #include "density/export/bricks.h"
 #include "density/export/cloud_picture.h"
 #include "density/export/containers.h"
