@@ -207,7 +207,10 @@ void draw_interface(Editor& editor) {
     take_typed_value(editor);
     finish_recorded_value(editor);
     // Keeps what is dragged, or typed into one field, one step of undo.
-    if (!ImGui::IsAnyMouseDown() && !ImGui::IsAnyItemActive()) editor.document->end_merging();
+    const ImGuiID item = active_item();
+    const bool goes_on = ImGui::IsAnyMouseDown() || (item != 0 && item == editor.merged_item);
+    if (!goes_on) editor.document->end_merging();
+    editor.merged_item = item;
 }
 
 void update_title(Editor& editor, std::string& shown) {

@@ -12,6 +12,7 @@
 #include <imgui_internal.h>
 #include <imgui_stdlib.h>
 
+#include "core/text.h"
 #include "scenes/format/text.h"
 
 namespace nephos {
@@ -39,26 +40,6 @@ Table& table() {
     return all;
 }
 
-// A character of UTF-8 and its bytes: one byte where they are invalid.
-struct Character {
-    unsigned code = 0;
-    std::size_t bytes = 1;
-};
-
-Character character_at(std::string_view text, std::size_t at) {
-    const auto byte = [&](std::size_t n) {
-        return at + n < text.size() ? unsigned(static_cast<unsigned char>(text[at + n])) : 0u;
-    };
-    const unsigned first = byte(0);
-    const std::size_t bytes = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : first >= 0xC0 ? 2 : 1;
-    unsigned code = bytes == 1 ? first : first & (0x7Fu >> bytes);
-    for (std::size_t n = 1; n < bytes; ++n) {
-        if ((byte(n) & 0xC0u) != 0x80u) return {first, 1};
-        code = code << 6 | (byte(n) & 0x3Fu);
-    }
-    return {code, bytes};
-}
-
 void append_utf8(std::string& text, unsigned code) {
     if (code > kLastOfField) text += char(0xF0 | code >> 18);
     text += char(code > kLastOfField ? 0x80 | (code >> 12 & 0x3F) : 0xE0 | code >> 12);
@@ -73,11 +54,11 @@ std::string replaced(std::string_view text, const Other& other) {
     out.reserve(text.size());
     for (std::size_t at = 0; at < text.size();) {
         const Character c = character_at(text, at);
-        if (c.bytes >= 3 && needs_another(c.code))
-            append_utf8(out, other(c.code));
+        if (c.valid && needs_another(unsigned(c.code)))
+            append_utf8(out, other(unsigned(c.code)));
         else
-            out.append(text, at, c.bytes);
-        at += c.bytes;
+            out += c.bytes;
+        at += c.bytes.size();
     }
     return out;
 }
@@ -231,6 +212,8 @@ std::string text_of_field(std::string_view field) {
         return is_known ? codes[code - kFirstOfTable] : code;
     });
 }
+
+ImGuiID active_item() { return ImGui::GetActiveID(); }
 
 bool press_enter_in_field() {
     const ImGuiContext& g = *ImGui::GetCurrentContext();

@@ -51,6 +51,9 @@ void finish_field_first();
 // To be called right after ImGui::NewFrame(): gives the caret to the field behind the one that Tab has left.
 void move_caret_on();
 
+// Returns what has the mouse or the caret; 0 when nothing has.
+ImGuiID active_item();
+
 // Presses Enter, for one frame, in a field of one line that has the caret; returns whether there is one.
 bool press_enter_in_field();
 

@@ -18,9 +18,9 @@ ImGuiWindowFlags panel_flags() {
            ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoBackground;
 }
 
-// A bar between two panels that the mouse moves; `size` is in points at scale 1.
+// A bar between two panels that the mouse moves; `size` and `least` are in points at scale 1.
 void splitter(Editor& editor, const char* name, const ImVec2& min, const ImVec2& max, bool vertical,
-              float sign, float& size, float scale) {
+              float sign, float least, float& size, float scale) {
     ImGui::SetNextWindowPos(min);
     ImGui::SetNextWindowSize(ImVec2(std::max(1.0f, max.x - min.x), std::max(1.0f, max.y - min.y)));
     ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
@@ -33,7 +33,7 @@ void splitter(Editor& editor, const char* name, const ImVec2& min, const ImVec2&
         ImGui::GetWindowDrawList()->AddRectFilled(min, max, ImGui::GetColorU32(ImGuiCol_SeparatorHovered));
     if (ImGui::IsItemActive()) {
         const float by = vertical ? ImGui::GetIO().MouseDelta.x : ImGui::GetIO().MouseDelta.y;
-        size = std::clamp(size + sign * by / scale, 60.0f, 1600.0f);
+        size = std::clamp(size + sign * by / scale, least, kLargestPanel);
     }
     ImGui::End();
     ImGui::PopStyleVar();
@@ -105,14 +105,15 @@ void layout(Editor& editor, float scale) {
           [&] { view_panel(editor); });
     ImGui::PopStyleVar();
     if (left > 0)
-        splitter(editor, "left bar", {left, top}, {left + bar, low}, true, 1, editor.settings.left, scale);
+        splitter(editor, "left bar", {left, top}, {left + bar, low}, true, 1, kLeastLeft,
+                 editor.settings.left, scale);
     if (right > 0) {
         splitter(editor, "right bar", {size.x - right - bar, top}, {size.x - right, low}, true, -1,
-                 editor.settings.right, scale);
+                 kLeastRight, editor.settings.right, scale);
     }
     if (bottom > 0) {
         splitter(editor, "bottom bar", {left + bar, middle}, {size.x - right - bar, middle + bar}, false, -1,
-                 editor.settings.bottom, scale);
+                 kLeastBottom, editor.settings.bottom, scale);
     }
     ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(9 * scale, 3 * scale));
     panel("Status", {0, low}, {size.x, size.y}, ImGuiWindowFlags_NoScrollbar, [&] { status_bar(editor); });

@@ -73,6 +73,18 @@ NumberForm form_of(const Key& key) {
     }
 }
 
+// Returns whether Escape has left a number as it was before it was typed; what was typed is then gone.
+bool is_given_up(Editor& editor, const TextPath& path) {
+    if (!ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape)) ||
+        ImGui::IsMouseDown(ImGuiMouseButton_Left))
+        return false;
+    if (editor.recorded_value && editor.recorded_value->path == path) {
+        editor.recorded_value.reset();
+        return true;
+    }
+    return editor.document->take_back(path_text(path));
+}
+
 void value_row(Editor& editor, const ValueRow& row) {
     const std::string name = path_text(row.path);
     ImGui::TableNextRow();
@@ -88,8 +100,9 @@ void value_row(Editor& editor, const ValueRow& row) {
     tooltip_of_last(hint_of(row).c_str());
     ImGui::TableNextColumn();
     bool unfinished = false;
-    if (const std::optional<std::string> value = edit_value(editor, row, unfinished)) {
-        const bool dragging = ImGui::IsItemActive() || ImGui::IsMouseDown(ImGuiMouseButton_Left);
+    const std::optional<std::string> value = edit_value(editor, row, unfinished);
+    if (!is_given_up(editor, row.path) && value) {
+        const bool dragging = active_item() != 0 || ImGui::IsMouseDown(ImGuiMouseButton_Left);
         if (unfinished)
             editor.typed = {row.path, &row.key, *value, true};
         else

@@ -88,6 +88,16 @@ bool SceneDocument::edit(std::string text, const std::string& what, const std::s
     return true;
 }
 
+bool SceneDocument::take_back(const std::string& merge) {
+    if (merge.empty() || merge != merge_ || at_ == 0 || at_ + 1 != history_.size()) return false;
+    history_bytes_ -= history_.back().text.size();
+    history_.pop_back();
+    --at_;
+    merge_.clear();
+    read();
+    return true;
+}
+
 void SceneDocument::undo() {
     if (!can_undo()) return;
     --at_;

@@ -48,6 +48,8 @@ class SceneDocument {
     bool edit(std::string text, const std::string& what, const std::string& merge = {});
     // Ends such a row.
     void end_merging() { merge_.clear(); }
+    // Takes such a step back as if it had never been, if it is the last one and goes on. Returns whether it did.
+    bool take_back(const std::string& merge);
 
     bool can_undo() const { return at_ > 0; }
     bool can_redo() const { return at_ + 1 < history_.size(); }

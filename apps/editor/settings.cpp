@@ -59,9 +59,9 @@ Settings read_settings(const std::filesystem::path& folder) {
         const std::string key = line.substr(0, equals), value = line.substr(equals + 3);
         if (key == "width") take(value, 200, 16384, settings.width);
         if (key == "height") take(value, 150, 16384, settings.height);
-        if (key == "left") take(value, 0.0f, 4000.0f, settings.left);
-        if (key == "right") take(value, 0.0f, 4000.0f, settings.right);
-        if (key == "bottom") take(value, 0.0f, 4000.0f, settings.bottom);
+        if (key == "left") take(value, kLeastLeft, kLargestPanel, settings.left);
+        if (key == "right") take(value, kLeastRight, kLargestPanel, settings.right);
+        if (key == "bottom") take(value, kLeastBottom, kLargestPanel, settings.bottom);
         if (key == "tab") take(value, 0, 2, settings.tab);
         if (key == "plots") settings.plots = value != "off";
         if (key == "shapes") settings.shapes = value != "off";

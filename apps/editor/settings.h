@@ -14,6 +14,9 @@ namespace nephos {
 // The range of the scale of texts and controls: 1 fits a display of 96 dots an inch.
 inline constexpr float kSmallestTextScale = 0.5f, kLargestTextScale = 4;
 
+// The range of panels, at scale 1: below it nothing in them could be read.
+inline constexpr float kLeastLeft = 140, kLeastRight = 220, kLeastBottom = 60, kLargestPanel = 1600;
+
 struct Settings {
     int width = 1360, height = 860;               // of the window
     float left = 250, right = 390, bottom = 190;  // of the panels, at scale 1

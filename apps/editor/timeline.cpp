@@ -178,7 +178,7 @@ void timeline_panel(Editor& editor) {
         editor.live->run(editor.running = false);
         editor.live->seek(step);
     }
-    editor.controls.note("time");
+    editor.controls.note("time line");
     tooltip_of_last(
         "Step that is shown; drag it. Steps that were seen come back from checkpoints in memory.");
     key_frame_strip(editor, from, width, last);

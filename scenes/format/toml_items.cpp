@@ -13,21 +13,33 @@ namespace {
 using Form = TomlNode::Form;
 constexpr std::size_t kNone = std::string_view::npos;
 
+// Returns the base of an integer with a prefix; 10 for all else.
+int base_of(std::string_view number) {
+    const std::string_view prefix = number.substr(0, 2);
+    return prefix == "0x" ? 16 : prefix == "0o" ? 8 : prefix == "0b" ? 2 : 10;
+}
+
+// Returns the number that a value of TOML is, if it is one below 2^53.
+std::optional<double> number_of(std::string_view value) {
+    std::string plain;
+    for (const char c : value)
+        if (c != '_') plain += c;
+    if (plain.starts_with('+')) plain.erase(0, 1);
+    const int base = base_of(plain);
+    const char *const begin = plain.data() + (base == 10 ? 0 : 2), *const end = plain.data() + plain.size();
+    double number = 0;
+    std::uint64_t whole = 0;
+    const auto parsed =
+        base == 10 ? std::from_chars(begin, end, number) : std::from_chars(begin, end, whole, base);
+    if (base != 10) number = double(whole);
+    constexpr double kLargestWhole = 9007199254740992;
+    if (parsed.ec != std::errc() || parsed.ptr != end || !(std::abs(number) < kLargestWhole))
+        return std::nullopt;
+    return number;
+}
+
 // Returns whether two values are written alike or, of up to 2^53, as the same number: `1.0e3` stays where 1000 is set.
 bool is_same_number(std::string_view a, std::string_view b) {
-    const auto number_of = [](std::string_view text) -> std::optional<double> {
-        std::string plain;
-        for (const char c : text)
-            if (c != '_') plain += c;
-        if (plain.starts_with('+')) plain.erase(0, 1);
-        double number = 0;
-        const auto [end, error] = std::from_chars(plain.data(), plain.data() + plain.size(), number);
-        constexpr double kLargestWhole = 9007199254740992;
-        if (plain.empty() || error != std::errc() || end != plain.data() + plain.size() ||
-            !(std::abs(number) < kLargestWhole))
-            return std::nullopt;
-        return number;
-    };
     if (a == b) return true;
     const std::optional<double> first = number_of(a);
     return first && first == number_of(b) && std::signbit(*first) == std::signbit(*number_of(b));
@@ -35,7 +47,8 @@ bool is_same_number(std::string_view a, std::string_view b) {
 
 // Returns whether what a key or an item has is left where it is set to `by`.
 bool stays(std::string_view was, std::string_view by, NumberForm form) {
-    const bool may_stay = form == NumberForm::any || was.find_first_of(".eEnf") == kNone;
+    const bool is_integer = base_of(was) != 10 || was.find_first_of(".eEnf") == kNone;
+    const bool may_stay = form == NumberForm::any || is_integer;
     return may_stay && is_same_number(was, by);
 }
 

@@ -90,6 +90,11 @@ TEST(TomlEdit, NumbersThatStayAreWrittenAsTheyWere) {
               "z = 1 # no integer");
     EXPECT_EQ(with_value("z = [1.0, 2_000, 3]", text_path("z"), "[1, 2000, 4]", NumberForm::integer),
               "z = [1, 2_000, 4]");
+    EXPECT_EQ(with_value("z = [0xfe, 0o17, 0b1_1, 0x1F, 7]", text_path("z"), "[254, 15, 3, 32, 8]",
+                         NumberForm::integer),
+              "z = [0xfe, 0o17, 0b1_1, 32, 8]");
+    EXPECT_EQ(with_value("z = [0x10, 2]", text_path("z"), "[16, 2, 5]"), "z = [0x10, 2, 5]");
+    EXPECT_EQ(with_value("z = 0x20000000000001", text_path("z"), "9007199254740993"), "z = 9007199254740993");
     EXPECT_EQ(with_value("z = 9007199254740993", text_path("z"), "9007199254740992"), "z = 9007199254740992");
 }
 

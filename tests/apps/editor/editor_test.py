@@ -386,10 +386,10 @@ class Story(Case):
             key SPACE
             wait-picture
             picture shown-%.png
-            set time 3
+            set "time line" 3
             wait-picture
             picture shown-%.png
-            set time 15
+            set "time line" 15
             wait-picture
             picture shown-%.png
             hashes seen.txt
@@ -444,7 +444,7 @@ class Story(Case):
             key SPACE
             wait-picture
             picture shown-%.png
-            set time 7
+            set "time line" 7
             wait-picture
             picture shown-%.png
             hashes seen.txt

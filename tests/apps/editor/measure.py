@@ -83,8 +83,8 @@ def change(window):
 def scrub(window):
     for scene in ("cumulus", "climate"):
         steps = [3, 997, 500, 501, 250, 123, 871, 42, 640, 999, 333, 0, 777]
-        script = ("key SPACE\nset time 1000\n" + "".join(f"wait-step {step}\n" for step in range(100, 1001, 100)) +
-                  "".join(f"set time {step}\nwait 1.2\n" for step in steps))
+        script = ("key SPACE\nset \"time line\" 1000\n" + "".join(f"wait-step {step}\n" for step in range(100, 1001, 100)) +
+                  "".join(f"set \"time line\" {step}\nwait 1.2\n" for step in steps))
         count, longest = found(rf"steps gone to {NUMBER}, shown within {NUMBER} ms",
                                window.report(SOURCE / f"scenes/{scene}.toml", script=script))
         row(f"any of 1,000 steps of {scene} that were seen", f"{count:.0f} times within {longest:.0f} ms", "500 ms")

@@ -275,6 +275,24 @@ class Safety(Case):
                                     f"wait 0.2\n{leave}\nwait 0.2\nkey CTRL+S\nwait 0.5\n")
             self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("0.1234567", first))
 
+    def test_escape_leaves_a_number_as_it_was(self):
+        """By the byte: its form, a key that the text does not have, one beyond its range; undo does not bring it back, and a
+        number beside it that was typed before stays."""
+        scene = self.folder / "e.toml"
+        text = 'name = "models"\nseed = 4\n[lattice]\ncells = [16, 0x10, 12]\ncell_size_m = 1.0e2\n'
+        for key, typed in (("lattice.cell_size_m", "250"), ("time.step_s", "3"), ("lattice.cell_size_m", "-7"),
+                           ("lattice.cell_size_m", "1000")):
+            section = key.partition(".")[0]
+            for undo in ("", 'click "tab View"\nkey CTRL+Z\nwait 0.2\nkey CTRL+Y\n'):
+                scene.write_text(text, encoding="utf-8")
+                self.edit(scene, script=f"wait-step 1\nclick {section}\nwait 0.2\ndouble-click-at {key} 0.5 0.5\nkey CTRL+A\ntype {typed}\n"
+                                        f"wait 0.2\nkey BACKSPACE\nwait 0.2\nkey ESCAPE\nwait 0.2\n{undo}wait 0.2\nkey CTRL+S\nwait 0.5\n")
+                self.assertEqual(scene.read_text(encoding="utf-8"), text, key)
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script="wait-step 1\nclick lattice\nwait 0.2\ndouble-click-at lattice.cells[0] 0.5 0.5\nkey CTRL+A\ntype 20\nkey TAB\n"
+                                "wait 0.3\ntype 21\nwait 0.2\nkey ESCAPE\nwait 0.2\nkey CTRL+S\nwait 0.5\n")
+        self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("[16,", "[20,"))
+
     def test_what_is_refused_is_told_by_ctrl_s_too(self):
         """Names that a model of a file has, or that are empty, and a seed that is none: each is said, and the scene saved without."""
         scene = self.folder / "r.toml"
@@ -850,6 +868,16 @@ class Models(Case):
 
 
 class Layout(Case):
+    def test_panels_stay_large_enough_to_be_read(self):
+        """However far a bar is dragged, and whatever the settings have."""
+        scene = self.scene("cumulus-by-hand.toml")
+        settings = self.folder / "config/nephos/editor.conf"
+        settings.parent.mkdir(parents=True)
+        settings.write_text("left = 60\nright = 0\nbottom = 1\n", encoding="utf-8")
+        self.edit(scene, script='wait-step 1\ndrag "left bar" -400 0\ndrag "right bar" 700 0\ndrag "bottom bar" 0 300\nwait 0.3\n')
+        values = dict(line.split(" = ", 1) for line in settings.read_text(encoding="utf-8").splitlines())
+        self.assertEqual([float(values[key]) for key in ("left", "right", "bottom")], [140, 220, 60])
+
     def test_it_is_remembered(self):
         """Size of the window, of panels, the tab, and recent files are those of the last session."""
         scene = self.scene("cumulus-by-hand.toml")

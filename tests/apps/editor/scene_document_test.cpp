@@ -142,6 +142,24 @@ TEST(SceneDocument, OneDragIsOneUndo) {
     EXPECT_EQ(document.redo_text(), "drag");
 }
 
+TEST(SceneDocument, WhatIsTakenBackHasNotBeen) {
+    const std::string first = "[sun]\nelevation_deg = 1.0e0\n";
+    SceneDocument document(first);
+    const TextPath path = text_path("sun.elevation_deg");
+    EXPECT_FALSE(document.take_back("sun"));
+    for (const char* value : {"2", "3"})
+        document.edit(with_value(document.text(), path, value), "type", "sun");
+    EXPECT_FALSE(document.take_back("moon"));
+    EXPECT_FALSE(document.take_back(""));
+    EXPECT_TRUE(document.take_back("sun"));
+    EXPECT_EQ(document.text(), first);
+    EXPECT_FALSE(document.can_undo() || document.can_redo() || document.take_back("sun"));
+    document.edit(with_value(document.text(), path, "4"), "type", "sun");
+    document.end_merging();
+    EXPECT_FALSE(document.take_back("sun"));
+    EXPECT_NE(document.text(), first);
+}
+
 TEST(SceneDocument, ProblemsLeaveTheLastGoodScene) {
     SceneDocument document(std::string("[sun]\nelevation_deg = 12\n"));
     ASSERT_TRUE(document.scene());
