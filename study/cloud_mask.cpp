@@ -202,8 +202,11 @@ SeriesMean mean_of(const std::vector<double>& values) {
     constexpr std::size_t kEnough = 8;
     if (std::ranges::any_of(values, [](double value) { return !std::isfinite(value); }))
         return {kNaN, kNaN, kNaN, kNaN, kNaN};
-    if (values.size() >= kEnough) return mean_over(values, {Regime::steady, 0, values.size(), 0, 0}, 1);
     const double n = double(values.size());
+    // Alike, they would differ from their mean by its rounding.
+    if (n > 1 && std::ranges::count(values, values.front()) == std::ptrdiff_t(n))
+        return {values.front(), 0, 0, 1, n};
+    if (values.size() >= kEnough) return mean_over(values, {Regime::steady, 0, values.size(), 0, 0}, 1);
     double sum = 0, squares = 0;
     for (const double value : values) sum += value;
     const double mean = sum / n;

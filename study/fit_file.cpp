@@ -11,6 +11,7 @@
 #include "study/axis_text.h"
 #include "study/cloud_mask.h"
 #include "study/fit.h"
+#include "study/measured_lattice.h"
 #include "study/run_statistics.h"
 #include "study/toml_table.h"
 #include "study/transform.h"
@@ -34,7 +35,8 @@ struct Measured {
     Extent extent;
     double cell_size_m = 0;
     double floor_m = 0;   // lower face of the lowest level
-    bool varies = false;  // a parameter changes its cells
+    std::string cells;    // the keys of its cells begin with
+    bool varies = false;  // a parameter changes them
 };
 
 // Reads the keys that say what is run. Returns nothing where that does not do, and has said so: the scene's own problems in
@@ -53,7 +55,12 @@ std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem:
         base.source.emplace(base.scene_file);
         const SweepPlan plan(base);
         const AutomatonOptions lattice = plan.lattice();
-        return Measured{*scene, lattice.extent, lattice.placement.cell_size_m, lattice.placement.origin_m.z};
+        const std::string layer =
+            plan.scene().layers.empty()
+                ? ""
+                : fmt::format("layer[{}].", measured_lattice(plan.scene(), plan.options().layer));
+        return Measured{*scene, lattice.extent, lattice.placement.cell_size_m, lattice.placement.origin_m.z,
+                        layer + "lattice.cell"};
     } catch (const SceneErrors& errors) {
         for (const Problem& problem : errors.problems()) {
             if (problem.where.line > 0)
@@ -129,7 +136,7 @@ void read_parameter(TomlTable& parameter, const SweepOptions& base, std::optiona
     for (std::string& key : to.keys) {
         key = canonical_key(key);
         if (check_key(parameter, key, known)) sound.push_back(key);
-        if (measured && key.starts_with("lattice.cell")) measured->varies = true;
+        if (measured && key.starts_with(measured->cells)) measured->varies = true;
     }
     bool has_prior = false;
     parameter.table("prior", [&](TomlTable& prior) {
@@ -294,8 +301,9 @@ void read_target_mask(TomlTable& target, const std::filesystem::path& folder,
         target.report("from", fmt::format("{} has no value of `{}`", to.from, to.statistic),
                       "expected another statistic");
     else if (check_value(target, "from", to) && !(to.sd > 0))
-        target.report("from", fmt::format("{} does not say how uncertain its `{}` is", to.from, to.statistic),
-                      "expected sd = ... beside it: a single snapshot has no standard error");
+        target.report(
+            "from", fmt::format("{} does not say how uncertain its `{}` is", to.from, to.statistic),
+            "expected sd = ... beside it: a single snapshot, or several alike, have no standard error");
 }
 
 void read_target(TomlTable& target, const std::filesystem::path& folder, int clouds_every,
@@ -350,7 +358,7 @@ FitOptions read_fit_file(const std::filesystem::path& path, std::optional<std::u
             table.report("parameter", "the fit has no parameter", "expected a table [[parameter]]");
         if (runs) options.problem.runs = *runs;
         const std::uint64_t fewest = fewest_runs(options.problem.parameters.size());
-        if (options.problem.runs < fewest)
+        if (!runs && options.problem.runs < fewest)
             table.report("runs",
                          fmt::format("{} runs are too few for {} parameters", options.problem.runs,
                                      options.problem.parameters.size()),

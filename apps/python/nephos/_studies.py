@@ -194,17 +194,12 @@ def _plan(axes, options):
         keys = [key] if isinstance(key, str) else list(key)
         if isinstance(values, (str, bytes)):
             raise _error(f"axes[{key!r}] is one text; expected a list of values", "usage")
-        if not isinstance(values, dict):
-            values = list(values)
-            if not values:
-                raise _error(f"axes[{key!r}] has no values; expected one or more, or {{'from': a, 'to': b, 'count': n}}", "usage")
-        name = "range" if isinstance(values, dict) else "values"
-        if isinstance(values, dict):
-            entries = ", ".join(f"{entry} = {_toml_text(value)}" for entry, value in values.items())
-            text = "{ " + entries + " }"
-        else:
-            text = _toml_text(values)
-        lines += ["", "[[axis]]", f"keys = {_toml_text(keys)}", f"{name} = {text}"]
+        is_range = isinstance(values, collections.abc.Mapping)
+        values = dict(values) if is_range else list(values)
+        if not values and not is_range:
+            raise _error(f"axes[{key!r}] has no values; expected one or more, or {{'from': a, 'to': b, 'count': n}}", "usage")
+        name = "range" if is_range else "values"
+        lines += ["", "[[axis]]", f"keys = {_toml_text(keys)}", f"{name} = {_toml_text(values)}"]
         places.update(dict.fromkeys((len(lines) - 1, len(lines)), "+".join(map(str, keys))))
     return "\n".join(lines) + "\n", places
 

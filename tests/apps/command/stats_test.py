@@ -16,7 +16,7 @@ from PIL import Image
 from scipy import ndimage
 from scipy.io import netcdf_file
 
-from case import Case, NEPHOS, SANITIZED, limit_addresses
+from case import Case, NEPHOS, SANITIZED, SOURCE, limit_addresses
 from fit_test import FIT, NULL
 from sweep_test import rows
 
@@ -512,6 +512,29 @@ sd = 20
         self.assertIn("note: the lowest level of levels.nc begins at 0 m, that of null.toml at 600 m: `base_mean_m`", said)
         self.refused_fit("from = []\nsd = 0.1", "names no file")
         self.refused_fit("from = [\"0.vdb\", 3]\nsd = 0.1", "`target[0].from` holds an integer")
+
+    def test_snapshots_that_are_alike_have_no_standard_error(self):
+        """However many: the rounding of their mean is none."""
+        self.write("null.toml", NULL)
+        Image.fromarray((random_mask(5, (24, 24), 0.38) * 255).astype(numpy.uint8)).save(self.folder / "m.png")
+        for count in (2, 7, 8, 11):
+            cover = self.stats(*["m.png"] * count, "--cell-size", "50")["statistics"]["cover"]
+            self.assertEqual((cover["se"], cover["sd"]), (0, 0), count)
+            files = ", ".join(["\"m.png\""] * count)
+            self.refused_fit(f"from = [{files}]\ncell_size_m = 50\n", "does not say how uncertain its `cover` is")
+
+    def test_the_cells_of_a_layer_are_a_parameter(self):
+        """A mask of other cells is no mistake where the fit changes those of the layer that is measured."""
+        Image.fromarray((random_mask(5, (32, 32), 0.3) * 255).astype(numpy.uint8)).save(self.folder / "m.png")
+        text = (FIT[:FIT.index("[[target]]")].replace("null.toml", f"{SOURCE}/scenes/genera/Cu-fra.toml").replace("runs = 32", "runs = 9")
+                .replace("clouds_every = 0", "clouds_every = 10") + "[[target]]\nstatistic = \"clouds_per_km2\"\n"
+                "from = \"m.png\"\ncell_size_m = 40\nsd = 1\n")
+        for key, prior, is_told in (("layer[0].base_height_m", "from = 300, to = 600", True),
+                                    ("layer[0].lattice.cell_size_m", "from = 30, to = 60", False)):
+            fit = text.replace("field.background.ext", key).replace("from = 0.02, to = 0.3", prior)
+            said = self.call("fit", self.write("f.toml", fit), "--out", "f", status=2).stderr
+            self.assertIn("9 runs are too few", said)
+            self.assertEqual("depends on that" in said, is_told, said)
 
     def test_what_a_view_from_above_lacks_is_no_target(self):
         self.write("null.toml", NULL)
