@@ -263,6 +263,8 @@ void open_dialog(Editor& editor, FileDialog dialog) {
 }
 
 void ask_before(Editor& editor, Pending what, fs::path path) {
+    // A field was left for this, and its text refused: it is not lost before that was seen.
+    if (is_refusal_unseen(editor)) return;
     const bool beside = what == Pending::open && editor.opens_beside;
     forget_pending(editor);  // what was asked before is asked anew
     editor.opens_beside = beside;

@@ -83,24 +83,14 @@ void take_new_results(Editor& editor, Clock::time_point& taken) {
     }
 }
 
-// Returns the text of a scene with what is being typed in it.
-std::string text_to_keep(const Editor& editor, const OpenScene& scene) {
-    const std::string& text = scene.document->text();
-    if (&scene != &editor || !editor.typed || scene.document->has_syntax_error()) return text;
-    try {
-        return with_value(text, editor.typed->path, editor.typed->value);
-    } catch (const Error&) {  // the text was changed meanwhile, and has no such place any more
-        return text;
-    }
-}
-
 // Writes the unsaved edits of all scenes down, of each whatever becomes of the others. Returns what could not be kept;
 // empty: all was.
 std::string autosave_all(Editor& editor) {
     std::string failures;
     for_each_scene(editor, [&](OpenScene& scene) {
         try {
-            scene.document->autosave(editor.folder, text_to_keep(editor, scene));
+            scene.document->autosave(editor.folder,
+                                     &scene == &editor ? text_with_typed(editor) : scene.document->text());
         } catch (const std::exception& error) {
             failures += (failures.empty() ? "" : "; ") + scene.document->title() + ": " + error.what();
         }
@@ -114,8 +104,10 @@ void look_after_files(Editor& editor) {
         editor.last_disk_look = now;
         attempt(editor, [&] {
             const SceneDocument::Disk disk = editor.document->look_at_disk();
-            if (disk == SceneDocument::Disk::reloaded)
+            if (disk == SceneDocument::Disk::reloaded) {
+                leave_number_field();
                 say(editor, "Another program changed the file: it was read again");
+            }
             // Once: later messages are to be seen, too.
             if (std::exchange(editor.disk, disk) == disk) return;
             if (disk == SceneDocument::Disk::differs)
@@ -319,7 +311,7 @@ std::unique_ptr<SceneDocument> first_document(Editor& editor) {
 std::string kept_edits(Editor& editor) {
     bool any = false;
     for_each_scene(editor, [&](const OpenScene& scene) { any |= scene.document->is_modified(); });
-    if (!any && !editor.typed) return {};
+    if (!any && !editor.typed && !editor.recorded_value) return {};
     const std::string failures = autosave_all(editor);
     if (!failures.empty()) return "; unsaved edits could not be kept: " + failures;
     return "; unsaved edits are kept, and are offered at the next start with this scene";
@@ -363,6 +355,11 @@ void say(Editor& editor, std::string message, bool is_bad) {
     editor.message_is_bad = is_bad || goes_on;
     editor.message_goes_on = goes_on;
     editor.message_time = Clock::now();
+}
+
+bool is_refusal_unseen(Editor& editor) {
+    const bool is_new = editor.message_is_bad && Clock::now() - editor.message_time < std::chrono::seconds(1);
+    return is_new && std::exchange(editor.held_refusal, editor.message_time) != editor.message_time;
 }
 
 void Controls::note(const std::string& name) {

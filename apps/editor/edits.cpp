@@ -34,8 +34,8 @@ void set_value(Editor& editor, const TextPath& path, const std::string& value, b
                NumberForm form) {
     const bool is_at_work =
         ImGui::IsAnyItemActive() || (editor.recorded_value && editor.recorded_value->path == path);
-    if (is_recorded(editor, path) && is_of_wind(path) && is_at_work) {
-        editor.recorded_value = {path, value};
+    if (is_recorded_when_left(editor, path) && is_at_work) {
+        editor.recorded_value = {path, value, form};
         return;
     }
     set_values(editor, TextPath(path.begin(), path.end() - 1), {{path.back().name, value}}, dragging, form);
@@ -44,14 +44,14 @@ void set_value(Editor& editor, const TextPath& path, const std::string& value, b
 void finish_recorded_value(Editor& editor) {
     if (!editor.recorded_value || ImGui::IsAnyItemActive()) return;
     const Editor::RecordedValue done = *std::exchange(editor.recorded_value, std::nullopt);
-    bool is_other = false;  // not where Escape gave back what it was
+    bool is_other = false;  // not where it was changed back
     attempt(editor, [&] {
         const std::string& text = editor.document->text();
-        is_other = with_value(text, done.path, done.value) != text;
+        is_other = with_value(text, done.path, done.value, done.form) != text;
     });
     if (is_other)
         set_values(editor, TextPath(done.path.begin(), done.path.end() - 1),
-                   {{done.path.back().name, done.value}});
+                   {{done.path.back().name, done.value}}, false, done.form);
 }
 
 void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging,

@@ -215,6 +215,14 @@ std::string text_of_field(std::string_view field) {
 
 ImGuiID active_item() { return ImGui::GetActiveID(); }
 
+void leave_number_field() {
+    ImGuiContext& g = *ImGui::GetCurrentContext();
+    if (g.ActiveId == 0 || g.ActiveId != g.TempInputId) return;
+    ImGui::ClearActiveID();
+    g.ActiveIdPreviousFrameHasBeenEditedBefore = false;  // what was typed is not taken
+    g.InputTextState.ID = 0;
+}
+
 bool press_enter_in_field() {
     const ImGuiContext& g = *ImGui::GetCurrentContext();
     const ImGuiInputTextState& state = g.InputTextState;
@@ -280,6 +288,11 @@ void hold_back(HeldInput& held, ImGuiIO& io) {
 
 void finish_field_first() {
     ImGuiIO& io = ImGui::GetIO();
+    // ImGui leaves the comma of a number out, and 12,5 would be 125.
+    const ImGuiContext& context = *ImGui::GetCurrentContext();
+    if (context.ActiveId != 0 && context.ActiveId == context.TempInputId)
+        for (ImWchar& c : io.InputQueueCharacters)
+            if (c == ',') c = '.';
     HeldInput& held = held_input();
     if (held.stage != Waiting::none) {
         held.typed.insert(held.typed.end(), io.InputQueueCharacters.begin(), io.InputQueueCharacters.end());

@@ -54,6 +54,9 @@ void move_caret_on();
 // Returns what has the mouse or the caret; 0 when nothing has.
 ImGuiID active_item();
 
+// Takes the caret out of a field of a number, which would give its own copy back once the number is another.
+void leave_number_field();
+
 // Presses Enter, for one frame, in a field of one line that has the caret; returns whether there is one.
 bool press_enter_in_field();
 

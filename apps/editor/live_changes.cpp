@@ -154,13 +154,18 @@ std::string with_sun_keys(std::string text, const Scene& scene, const std::vecto
 // The step of the picture that is shown: what it shows is decided by the newest change.
 std::uint64_t shown_step(const Editor& editor) { return editor.picture ? editor.picture->step : 0; }
 
+std::string with_recorded_sun(const Editor& editor, const std::string& text, const SunKey& wanted,
+                              std::uint64_t step) {
+    const Scene& scene = *editor.shown_scene;
+    const bool adds_one = !editor.record && !scene.sun_path.empty();
+    return with_sun_keys(text, scene,
+                         adds_one ? sun_with_key(scene, wanted, step) : changed_sun(scene, wanted, step));
+}
+
 void record_sun(Editor& editor, const SunKey& wanted) {
     const std::uint64_t step = shown_step(editor);
-    const Scene& scene = *editor.shown_scene;
     const auto changed = [&](const std::string& text) {
-        const bool adds_one = !editor.record && !scene.sun_path.empty();
-        return with_sun_keys(text, scene,
-                             adds_one ? sun_with_key(scene, wanted, step) : changed_sun(scene, wanted, step));
+        return with_recorded_sun(editor, text, wanted, step);
     };
     // One drag is one step of the history, over as many steps of the simulation as it lasts.
     if (change_text(editor, changed, "Sun from step " + std::to_string(step), "live sun"))
@@ -205,28 +210,53 @@ std::optional<Scene> scene_of(const Editor& editor, const std::string& text) {
     }
 }
 
-bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, const std::string& edited) {
-    const Held held(*editor.live);
-    const Scene before = *editor.shown_scene;
-    const std::string& text = editor.document->text();
+// Path of the array of a wind that a path leads into.
+TextPath wind_array(const TextPath& path) {
+    return {path.begin(), path.begin() + std::ptrdiff_t(wind_length(path))};
+}
+
+// Key frames of a wind with the one at `path` as in the text `edited` from a step on; nothing where that has problems.
+std::optional<std::vector<WindKeyframe>> recorded_keys(const Editor& editor, const TextPath& path,
+                                                       const std::string& edited, std::uint64_t from) {
     const std::optional<Scene> wanted = scene_of(editor, edited);
-    if (!wanted) return false;
-    // Clouds that enter at the end of the present step were placed with the wind that it has there: the change follows it.
-    const std::uint64_t from = held.step + 1;
+    if (!wanted) return std::nullopt;
+    const TextPath array = wind_array(path);
     const std::size_t index = path[array.size()].index;
     const Wind& changed = wind_at_path(*wanted, array);
-    if (index >= changed.keyframes.size()) return false;
-    const std::vector<WindKeyframe> keys = changed_keys(
-        wind_at_path(before, array), changed.keyframes[index].levels, from, before.automaton.time_step_s);
+    if (index >= changed.keyframes.size()) return std::nullopt;
+    const Scene& before = *editor.shown_scene;
+    return changed_keys(wind_at_path(before, array), changed.keyframes[index].levels, from,
+                        before.automaton.time_step_s);
+}
+
+bool record_wind(Editor& editor, const TextPath& path, const std::string& edited) {
+    const Held held(*editor.live);
+    // Clouds that enter at the end of the present step were placed with the wind that it has there: the change follows it.
+    const std::uint64_t from = held.step + 1;
+    const auto keys = recorded_keys(editor, path, edited, from);
+    if (!keys) return false;
+    const TextPath array = wind_array(path);
     say(editor, "Wind recorded from step " + std::to_string(from) + " on");
-    apply(editor, with_keyframes(text, array, keys), "Wind from step " + std::to_string(from),
-          "live " + std::to_string(held.step));
+    apply(editor, with_keyframes(editor.document->text(), array, *keys),
+          "Wind from step " + std::to_string(from), "live " + std::to_string(held.step));
     // What is shown of the list is now its newest key frame.
     if (editor.selected.size() > array.size() &&
         std::equal(array.begin(), array.end(), editor.selected.begin())) {
-        editor.selected[array.size()].index = keys.size() - 1;
+        editor.selected[array.size()].index = keys->size() - 1;
     }
     return true;
+}
+
+// The sun at the step that is shown with a key as in the text `edited`; nothing where that has problems.
+std::optional<SunKey> recorded_sun(const Editor& editor, const TextPath& path, const std::string& edited) {
+    const std::optional<Scene> wanted = scene_of(editor, edited);
+    if (!wanted) return std::nullopt;
+    const Sun now = sun_now(editor), &then = wanted->render.sun;
+    SunKey key{0, now.elevation_deg, now.azimuth_deg, now.colour};
+    if (path[1].name == "elevation_deg") key.elevation_deg = then.elevation_deg;
+    if (path[1].name == "azimuth_deg") key.azimuth_deg = then.azimuth_deg;
+    if (path[1].name == "colour") key.colour = then.colour;
+    return key;
 }
 
 }  // namespace
@@ -243,6 +273,10 @@ Sun sun_now(const Editor& editor) {
 bool is_of_wind(const TextPath& path) {
     const std::size_t length = wind_length(path);
     return length > 0 && path.size() > length + 1 && path.back().name != "time_s";
+}
+
+bool is_recorded_when_left(const Editor& editor, const TextPath& path) {
+    return is_recorded(editor, path) && (is_of_wind(path) || (is_sun(path) && ImGui::GetIO().WantTextInput));
 }
 
 std::optional<std::string> value_now(const Editor& editor, const TextPath& path) {
@@ -276,22 +310,23 @@ void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dra
 bool record_live(Editor& editor, const TextPath& path, const std::string& edited) {
     if (!editor.shown_scene || !editor.document->problems().empty()) return false;
     if (is_sun(path)) {
-        const std::optional<Scene> wanted = scene_of(editor, edited);
-        if (!wanted) return false;
-        const Sun now = sun_now(editor);
-        SunKey key{0, now.elevation_deg, now.azimuth_deg, now.colour};
-        if (path[1].name == "elevation_deg") key.elevation_deg = wanted->render.sun.elevation_deg;
-        if (path[1].name == "azimuth_deg") key.azimuth_deg = wanted->render.sun.azimuth_deg;
-        if (path[1].name == "colour") key.colour = wanted->render.sun.colour;
-        record_sun(editor, key);
-        return true;
+        const std::optional<SunKey> key = recorded_sun(editor, path, edited);
+        if (key) record_sun(editor, *key);
+        return key.has_value();
     }
-    if (is_of_wind(path)) {
-        const std::size_t length = wind_length(path);
-        return record_wind(editor, TextPath(path.begin(), path.begin() + std::ptrdiff_t(length)), path,
-                           edited);
+    return is_of_wind(path) && record_wind(editor, path, edited);
+}
+
+std::string with_recorded(const Editor& editor, const TextPath& path, const std::string& edited) {
+    if (!editor.shown_scene || !editor.document->problems().empty()) return edited;
+    const std::string& text = editor.document->text();
+    if (is_sun(path)) {
+        const std::optional<SunKey> key = recorded_sun(editor, path, edited);
+        return key ? with_recorded_sun(editor, text, *key, shown_step(editor)) : edited;
     }
-    return false;
+    if (!is_of_wind(path)) return edited;
+    const auto keys = recorded_keys(editor, path, edited, editor.live->status().step + 1);
+    return keys ? with_keyframes(text, wind_array(path), *keys) : edited;
 }
 
 void record_climate(Editor& editor, double final_state, double duration_s) {

@@ -12,6 +12,7 @@
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
 #include "apps/editor/value_controls.h"
+#include "core/error.h"
 #include "scenes/format/text.h"
 
 namespace nephos {
@@ -83,6 +84,17 @@ bool is_given_up(Editor& editor, const TextPath& path) {
         return true;
     }
     return editor.document->take_back(path_text(path));
+}
+
+// Returns whether a value is a name by which other keys may call its element.
+bool is_name(const TextPath& path, const Key& key, const std::string& value) {
+    return key.name == "name" && path.size() >= 2 && value.starts_with('"');
+}
+
+// Throws Error(usage) for a name that is refused.
+std::string renamed(const Editor& editor, const std::string& text, const TextPath& path,
+                    const std::string& name) {
+    return with_new_name(text, editor.document->values(), path, name, names_from_files(editor));
 }
 
 void value_row(Editor& editor, const ValueRow& row) {
@@ -233,17 +245,49 @@ void found_rows(Editor& editor, const Section& section, const TextPath& path) {
     }
 }
 
+// Goes up to the list where what is selected is not there any more, as another program has taken it out.
+void leave_missing_element(Editor& editor) {
+    if (editor.document->has_syntax_error()) return;  // it may be there all the same
+    TextPath path;
+    for (const TextStep& step : editor.selected) {
+        path.push_back(step);
+        if (!step.name.empty() || value_node(editor.document->values(), path) != nullptr) continue;
+        path.pop_back();
+        editor.selected = path;
+        return;
+    }
+}
+
 }  // namespace
 
 void take_value(Editor& editor, const TextPath& path, const Key& key, const std::string& value,
                 bool dragging) {
-    if (key.name != "name" || path.size() < 2 || !value.starts_with('"'))
-        return set_value(editor, path, value, dragging, form_of(key));
-    const Node typed = parsed_value(value);
-    const auto renamed = [&](const std::string& text) {
-        return with_new_name(text, editor.document->values(), path, typed.text, names_from_files(editor));
-    };
-    change_text(editor, renamed, "Rename to " + typed.text);
+    if (!is_name(path, key, value)) return set_value(editor, path, value, dragging, form_of(key));
+    const std::string name = parsed_value(value).text;
+    change_text(
+        editor, [&](const std::string& text) { return renamed(editor, text, path, name); },
+        "Rename to " + name);
+}
+
+std::string text_with_typed(const Editor& editor) {
+    const std::string& text = editor.document->text();
+    if (editor.document->has_syntax_error()) return text;
+    try {
+        if (const auto& recorded = editor.recorded_value)
+            return with_recorded(editor, recorded->path,
+                                 with_value(text, recorded->path, recorded->value, recorded->form));
+        if (!editor.typed) return text;
+        const auto& [path, key, value, is_drawn] = *editor.typed;
+        if (is_name(path, *key, value)) {
+            try {
+                return renamed(editor, text, path, parsed_value(value).text);
+            } catch (const Error&) {  // it would be refused, and is kept as it is
+            }
+        }
+        return with_value(text, path, value, form_of(*key));
+    } catch (const Error&) {  // the text was changed meanwhile, and has no such place any more
+        return text;
+    }
 }
 
 void take_typed_value(Editor& editor) {
@@ -261,6 +305,7 @@ std::size_t models_from_files(const Editor& editor) {
 }
 
 void properties_panel(Editor& editor) {
+    leave_missing_element(editor);
     ImGui::SetNextItemWidth(-1);
     input_text("##filter", editor.filter, "Find a key of the scene");
     editor.controls.note("find");

@@ -201,6 +201,7 @@ struct Editor : OpenScene {
     std::vector<std::filesystem::path> folder_scenes;
     std::string message;  // in the status bar
     bool message_is_bad = false, message_goes_on = false;  // behind what was refused
+    std::chrono::steady_clock::time_point held_refusal;    // of the message for which the editor did not end
     // Holds what is typed into a field that has the caret: it is kept with the edits, and taken where the field is drawn no more.
     struct TypedValue {
         TextPath path;
@@ -209,11 +210,12 @@ struct Editor : OpenScene {
         bool is_drawn = true;
     };
     std::optional<TypedValue> typed;
-    // A number of a wind that is recorded, as long as its field has the mouse or the caret: a key frame takes its place when it is
-    // recorded, and the field goes with it.
+    // A number that is recorded when its field is left: of a wind, for a key frame takes its place and the field goes with it, and
+    // what is typed of a sun.
     struct RecordedValue {
         TextPath path;
         std::string value;
+        NumberForm form = NumberForm::any;
     };
     std::optional<RecordedValue> recorded_value;
     ImGuiID merged_item =
@@ -233,6 +235,8 @@ void save_rgba(const std::filesystem::path& path, int width, int height, std::sp
 
 // Says something in the status bar.
 void say(Editor& editor, std::string message, bool is_bad = false);
+// Returns whether something was refused in this moment, which the user has not had time to see; once for each refusal.
+bool is_refusal_unseen(Editor& editor);
 
 // edits.cpp: does something that may throw; what went wrong is said in the status bar. Returns whether it was done.
 bool attempt(Editor& editor, const std::function<void()>& act);
@@ -248,7 +252,9 @@ void take_value(Editor& editor, const TextPath& path, const Key& key, const std:
                 bool dragging = false);
 // Takes what was typed into a field that is not drawn any more, as in a window that became too small for its panel.
 void take_typed_value(Editor& editor);
-// Applies a wind that was typed or dragged while it is recorded, once its field is left.
+// Returns the text of the scene that is shown with what is being typed, or is to be recorded, in it.
+std::string text_with_typed(const Editor& editor);
+// Applies what was typed or dragged while it is recorded, once its field is left.
 void finish_recorded_value(Editor& editor);
 // Several keys of a table as one step of the history.
 void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries,
@@ -364,8 +370,10 @@ bool record_live(Editor& editor, const TextPath& path, const std::string& edited
 // Returns whether a change of a key is to be recorded: while the user records, and always of a sun with key frames, which
 // stand in the place of the key.
 bool is_recorded(const Editor& editor, const TextPath& path);
-// Returns whether a path leads to a number of a wind's key frame, other than its time.
-bool is_of_wind(const TextPath& path);
+// Returns the text that record_live() would make now; `edited` for keys that cannot be recorded.
+std::string with_recorded(const Editor& editor, const TextPath& path, const std::string& edited);
+// Returns whether a number that its field changes now is recorded once that is left.
+bool is_recorded_when_left(const Editor& editor, const TextPath& path);
 // Returns the value of a key that key frames stand for, at the step that is shown; nothing for other keys.
 std::optional<std::string> value_now(const Editor& editor, const TextPath& path);
 // Moves the sun: from the present step on when that is_recorded(), otherwise for good.

@@ -37,6 +37,28 @@ base_height_m = 1000
 lattice = { cells = [32, 32, 8], cell_size_m = 80, origin_m = [-1280, -1280, 900] }
 """
 
+WIND = """name = "w"
+[lattice]
+cells = [16, 16, 12]
+[[wind]]
+levels = [{ height_m = 1000, from_deg = 250, speed_m_per_s = 7.5 }] # low
+"""
+RECORD_WIND = """wait 0.3
+key SPACE
+key HOME
+wait 0.3
+key .
+key .
+wait 0.4
+click "tab View"
+click "Record as key frames"
+click wind
+click wind[0]
+click wind[0].levels
+click wind[0].levels[0]
+wait 0.3
+"""
+
 
 class Safety(Case):
     def models(self):
@@ -229,18 +251,14 @@ class Safety(Case):
     def test_a_recorded_wind_is_the_whole_number(self):
         """Typed key by key or dragged, while key frames are recorded; Escape records nothing."""
         scene = self.folder / "w.toml"
-        text = ('name = "w"\n[lattice]\ncells = [16, 16, 12]\n[[wind]]\n'
-                'levels = [{ height_m = 1000, from_deg = 250, speed_m_per_s = 7.5 }] # low\n')
-        start = ('wait 0.3\nkey SPACE\nkey HOME\nwait 0.3\nkey .\nkey .\nwait 0.4\nclick "tab View"\nclick "Record as key frames"\n'
-                 "click wind\nclick wind[0]\nclick wind[0].levels\nclick wind[0].levels[0]\nwait 0.3\n")
         typed = "double-click-at wind[0].levels[0].speed_m_per_s 0.5 0.5\nkey CTRL+A\ntype 1\nwait 0.3\ntype 2\nwait 0.3\ntype .5\nwait 0.3\n"
         for act, least, most in ((typed + "key ENTER\n", 12.4999, 12.5001), (typed + "key TAB\n", 12.4999, 12.5001),
                                  ("drag wind[0].levels[0].speed_m_per_s 60 0\n", 9, 13), (typed + "key ESCAPE\n", None, None)):
-            scene.write_text(text, encoding="utf-8")
-            self.edit(scene, script=f"{start}{act}wait 0.3\nkey CTRL+S\nwait 0.5\n")
+            scene.write_text(WIND, encoding="utf-8")
+            self.edit(scene, script=f"{RECORD_WIND}{act}wait 0.3\nkey CTRL+S\nwait 0.5\n")
             written = scene.read_text(encoding="utf-8")
             if least is None:
-                self.assertEqual(written, text)
+                self.assertEqual(written, WIND)
                 continue
             level, = tomllib.loads(written)["wind"][-1]["levels"]
             speed = (level["east_m_per_s"] ** 2 + level["north_m_per_s"] ** 2) ** 0.5
@@ -462,22 +480,73 @@ class Safety(Case):
         scene = self.folder / "t.toml"
         text = 'name = "models"\nseed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n'
         scene.write_text(text, encoding="utf-8")
-        script, ready, autosave = self.folder / "script.txt", self.folder / "ready.txt", self.folder / ".t.toml.autosave"
         for key, typed, kept in (("name", "xyz", text.replace("models", "modelsxyz")), ("seed", "56", text.replace("= 4", "= 456")),
                                  ("seed", "x", text.replace("= 4", '= "4x"'))):
             for end in (signal.SIGTERM, signal.SIGKILL):
-                script.write_text(f"wait-step 1\nclick scene\nwait 0.2\nclick {key}\nkey END\ntype {typed}\nwait 0.3\nhashes ready.txt\nwait 100\n",
-                                  encoding="utf-8")
-                command = self.command(scene, "--script", script)
-                editor = subprocess.Popen(command, cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
-                self.wait_for(ready, editor)
-                if end == signal.SIGKILL:
-                    self.wait_for(autosave, editor)
-                editor.send_signal(end)
-                editor.communicate(timeout=60)
-                self.assertEqual(autosave.read_text(encoding="utf-8"), kept)
-                autosave.unlink()
-                ready.unlink()
+                script = f"wait-step 1\nclick scene\nwait 0.2\nclick {key}\nkey END\ntype {typed}\nwait 0.3\n"
+                self.assertEqual(self.keep_by_signal(scene, script, end), kept)
+
+    def keep_by_signal(self, scene, script, end=signal.SIGTERM):
+        """What is kept of the edits of such a script when a signal ends the editor."""
+        ready, autosave = self.folder / "ready.txt", scene.parent / f".{scene.name}.autosave"
+        editor = subprocess.Popen(self.command(scene, script=script + "hashes ready.txt\nwait 100\n"), cwd=self.folder,
+                                  env=self.environment, stderr=subprocess.PIPE, text=True)
+        self.wait_for(ready, editor)
+        if end == signal.SIGKILL:
+            self.wait_for(autosave, editor)
+        editor.send_signal(end)
+        editor.communicate(timeout=60)
+        kept = autosave.read_text(encoding="utf-8")
+        autosave.unlink()
+        ready.unlink()
+        return kept
+
+    def test_a_recorded_number_that_is_being_typed_is_kept(self):
+        """As the key frame that it is about to be; and a name with those that use it."""
+        scene = self.folder / "w.toml"
+        scene.write_text(WIND, encoding="utf-8")
+        typed = RECORD_WIND + "double-click-at wind[0].levels[0].speed_m_per_s 0.5 0.5\nkey CTRL+A\ntype 12.5\nwait 0.3\n"
+        for end in (signal.SIGTERM, signal.SIGKILL):
+            first, *_, last = tomllib.loads(self.keep_by_signal(scene, typed, end))["wind"]
+            self.assertGreater(last["time_s"], first.get("time_s", 0))
+            level, = last["levels"]
+            self.assertAlmostEqual((level["east_m_per_s"] ** 2 + level["north_m_per_s"] ** 2) ** 0.5, 12.5, 3)
+        kept = self.keep_by_signal(self.models(), "wait-step 1\nclick model\nclick model[0]\nclick \"tab Properties\"\nwait 0.3\n"
+                                   "click model[0].name\nkey END\ntype xyz\nwait 0.3\n")
+        self.assertEqual(kept, MODELS.replace('"bank"', '"bankxyz"'))
+
+    def test_a_number_of_another_program_stays(self):
+        """Where the caret stands in its field, and nothing was typed."""
+        scene = self.folder / "n.toml"
+        text = 'seed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n'
+        for leave in ("key ESCAPE\n", "click scene\n", "key ENTER\n", ""):
+            scene.write_text(text, encoding="utf-8")
+            editor = subprocess.Popen(
+                self.command(scene, script='wait-step 1\nclick lattice\nclick "tab Properties"\nwait 0.2\ndouble-click-at lattice.cell_size_m 0.5 0.5\n'
+                                           f"wait 0.3\nhashes ready.txt\nwait 3\n{leave}wait 0.3\nkey CTRL+S\nwait 0.5\n"),
+                cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+            self.wait_for(self.folder / "ready.txt", editor)
+            (self.folder / "new").write_text(text.replace("= 100", "= 150"), encoding="utf-8")
+            os.replace(self.folder / "new", scene)
+            said = editor.communicate(timeout=120)[1]
+            self.assertEqual((editor.returncode, scene.read_text(encoding="utf-8")), (0, text.replace("= 100", "= 150")), leave + said)
+            (self.folder / "ready.txt").unlink()
+
+    def test_an_end_waits_for_what_is_refused(self):
+        """Once, so that it is seen; the second one ends the editor."""
+        scene = self.folder / "q.toml"
+        scene.write_text('seed = 4\n[lattice]\ncells = [16, 16, 12]\n', encoding="utf-8")
+        typed = 'wait-step 1\nclick scene\nclick "tab Properties"\nwait 0.2\nclick seed\nkey END\ntype x\nwait 0.2\n'
+        self.edit(scene, script=f"{typed}key CTRL+Q\nwait 0.5\nexpect-control refusal\nwait 1\nkey CTRL+Q\nwait 0.5\nexpect-control nothing\n")
+        self.assertIn("no control 'nothing'", self.edit(scene, script=f"{typed}key CTRL+Q\nwait 0.5\nexpect-control nothing\n", status=1))
+
+    def test_a_comma_is_a_point(self):
+        scene = self.folder / "k.toml"
+        text = 'seed = 4\n[lattice]\ncells = [16, 16, 12]\ncell_size_m = 100\n'
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script='wait-step 1\nclick lattice\nclick "tab Properties"\nwait 0.2\ndouble-click-at lattice.cell_size_m 0.5 0.5\n'
+                                "key CTRL+A\ntype 12,5\nwait 0.2\nkey ENTER\nkey CTRL+S\nwait 0.5\n")
+        self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("= 100", "= 12.5"))
 
     def test_a_window_too_small_for_a_field_takes_no_text_away(self):
         """What is typed when the panel is drawn no more counts as if the field had been left; a name is followed by its users."""
