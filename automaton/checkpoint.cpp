@@ -50,6 +50,11 @@ void check_head(ByteReader& in) {
     }
 }
 
+// An error of the system, as one while it is read, and no sign of damage.
+void go_to(std::ifstream& in, std::uint64_t at) {
+    if (!in.seekg(std::streamoff(at))) in.setstate(std::ios::badbit);
+}
+
 // The head and the sizes that a file states, against its own size, before anything is allocated for them.
 void check_sizes(std::ifstream& in, std::uint64_t file_size) {
     std::array<std::byte, kHeadBytes> head{};
@@ -60,7 +65,7 @@ void check_sizes(std::ifstream& in, std::uint64_t file_size) {
     std::uint64_t at = kHeadBytes;
     for (const char* what : {kStateName, kHistoryName}) {
         std::uint64_t size = 0;
-        in.seekg(std::streamoff(at));
+        go_to(in, at);
         if (at > file_size || file_size - at < sizeof size ||
             !in.read(reinterpret_cast<char*>(&size), sizeof size)) {
             throw Error(ErrorCode::io, std::string("ends before the ") + what);
@@ -91,7 +96,7 @@ std::vector<std::byte> read_all(const std::filesystem::path& path) {
         throw Error(ErrorCode::io, path.string() + ": " + error.what());
     }
     std::vector<std::byte> bytes(size);
-    in.seekg(0);
+    go_to(in, 0);
     if (!in.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(size))) {
         check_reading(in, path);
         throw Error(ErrorCode::io, path.string() + ": became shorter while it was read");

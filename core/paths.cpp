@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/descriptor.h"
@@ -46,51 +47,51 @@ void flush_folder(const std::filesystem::path& folder, const std::filesystem::pa
         fail(reported, "cannot flush its folder to the device", std::strerror(error));
 }
 
-}  // namespace
-
-void create_folders(const std::filesystem::path& folder) {
-    const std::vector<std::filesystem::path> holders = holders_of_missing(folder);
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) fail(folder, "cannot create the folder", error.message());
-    for (const std::filesystem::path& holder : holders) flush_folder(holder, folder);
-}
-
-namespace {
-
-std::filesystem::file_type known(const std::filesystem::path& path, std::filesystem::file_type type,
-                                 const std::error_code& error) {
+std::filesystem::file_type known_type(const std::filesystem::path& path, std::filesystem::file_type type,
+                                      const std::error_code& error) {
     if (type == std::filesystem::file_type::none) throw ReadFailure(path, error.message(), "examine");
     return type;
 }
 
 }  // namespace
 
+void create_folders(const std::filesystem::path& folder) {
+    const std::vector<std::filesystem::path> holders = holders_of_missing(folder);
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error == std::errc::file_exists && type_behind(folder) == std::filesystem::file_type::not_found)
+        fail(folder, "cannot create the folder", "a link stands there that leads nowhere");
+    if (error) fail(folder, "cannot create the folder", error.message());
+    for (const std::filesystem::path& holder : holders) flush_folder(holder, folder);
+}
+
 std::filesystem::file_type type_at(const std::filesystem::path& path) {
     std::error_code error;
-    return known(path, std::filesystem::symlink_status(path, error).type(), error);
+    return known_type(path, std::filesystem::symlink_status(path, error).type(), error);
 }
 
 std::filesystem::file_type type_behind(const std::filesystem::path& path) {
     std::error_code error;
     const auto type = std::filesystem::status(path, error).type();
     if (error == std::errc::too_many_symbolic_link_levels) return std::filesystem::file_type::not_found;
-    return known(path, type, error);
+    return known_type(path, type, error);
 }
 
 bool stands_there(const std::filesystem::path& path) {
     return type_at(path) != std::filesystem::file_type::not_found;
 }
 
+std::optional<FileIdentity> identity_behind(const std::filesystem::path& path) {
+    struct stat status {};
+    if (path.empty()) return std::nullopt;
+    if (::stat(path.c_str(), &status) == 0) return FileIdentity{status.st_dev, status.st_ino};
+    if (errno == ENOENT || errno == ENOTDIR || errno == ELOOP) return std::nullopt;
+    throw ReadFailure(path, std::strerror(errno), "examine");
+}
+
 bool is_same_place(const std::filesystem::path& a, const std::filesystem::path& b) {
-    if (a.empty() || b.empty()) return false;
-    for (const std::filesystem::path* path : {&a, &b})
-        if (type_behind(*path) == std::filesystem::file_type::not_found) return false;
-    std::error_code error;
-    const bool same = std::filesystem::equivalent(a, b, error);
-    if (error && error != std::errc::no_such_file_or_directory)
-        throw ReadFailure(a, error.message(), "examine");
-    return same && !error;
+    const std::optional<FileIdentity> first = identity_behind(a), second = identity_behind(b);
+    return first && second && *first == *second;
 }
 
 std::vector<std::string> names_in_folder(const std::filesystem::path& folder) {

@@ -55,8 +55,7 @@ std::vector<std::string> frame_parts(const RunFolder& folder) {
 
 // Returns the name of the scene of the run that is in the folder; empty where none tells it.
 std::string earlier_name(const RunFolder& folder) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(folder.manifest(), error)) return {};
+    if (type_behind(folder.manifest()) != std::filesystem::file_type::regular) return {};
     try {
         const std::string name = read_manifest(folder.manifest()).name;
         return std::filesystem::path(name).filename() == name ? name : "";  // leads nowhere else

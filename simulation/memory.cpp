@@ -10,6 +10,7 @@
 #include "automaton/automaton.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "density/vdb/vdb_file.h"
 #include "simulation/frame_output.h"
 #include "simulation/scene_files.h"
 #include "simulation/simulation.h"
@@ -58,6 +59,11 @@ double voxels_in_blocks(const Extent& cells, int refine) {
     return along(cells.x) * along(cells.y) * along(cells.z);
 }
 
+// A grid of the wind, of so many voxels in blocks.
+double velocity_bytes(double voxels) {
+    return kBytesPerVelocity * std::min(voxels, 512 * kMostVelocityBlocks);
+}
+
 // Cells around which a CoverageField has samples, when there is cloud in every brick.
 double cells_with_detail(const Extent& cells) {
     constexpr double kMargin = 16;  // on both sides together, of metaballs of two cells
@@ -71,7 +77,7 @@ double grid_bytes(const Extent& cells, const DensityOptions& density, bool detai
     double bytes = (kGrids + under_way) * kBytesPerVoxel * voxels_in_blocks(cells, 1);
     if (density.refine > 1) bytes += kBytesPerVoxel * written;
     double copies = 0;
-    if (density.write_velocity) copies += kBytesPerVelocity * written;
+    if (density.write_velocity) copies += velocity_bytes(written);
     if (density.write_state) copies += kBytesPerBits * written;
     // The field that a grid is refined from is gone before its copies are made.
     const bool detailed = density.refine > 1 && detail;
@@ -130,6 +136,22 @@ MemoryEstimate veil_estimate(const Scene& scene, const AutomatonOptions& lattice
     return estimate;
 }
 
+// Voxels in blocks of the box around all layers, in voxels of `voxel_m`.
+double voxels_of_box(const Scene& scene, double voxel_m) {
+    double voxels = 1;
+    for (int a = 0; a < 3; ++a) {
+        double low = std::numeric_limits<double>::infinity(), high = -low;
+        for (const LayerOptions& layer : scene.layers) {
+            if (!has_density(layer)) continue;
+            const int count = a == 0 ? layer.extent.x : a == 1 ? layer.extent.y : layer.extent.z;
+            low = std::min(low, layer.placement.origin_m[a]);
+            high = std::max(high, layer.placement.origin_m[a] + count * layer.placement.cell_size_m);
+        }
+        voxels *= std::max(8.0, (high - low) / voxel_m + 8);
+    }
+    return voxels;
+}
+
 // Grids of all layers together, which have the smallest voxels of all: of the frame that is made and of those
 // under way. A refined one is of one frame alone.
 double combined_bytes(const Scene& scene, double under_way) {
@@ -143,7 +165,10 @@ double combined_bytes(const Scene& scene, double under_way) {
         if (has_density(scene.layers[n])) voxels += voxels_of_size(automaton_options(scene, n), finest_m);
     }
     const double coarse = voxels / std::pow(double(scene.density.refine), 3);
-    return (voxels + under_way * coarse) * kBytesPerVoxel;
+    const double wind = scene.density.write_velocity && scene.density_files.combined
+                            ? velocity_bytes(voxels_of_box(scene, finest_m))
+                            : 0;
+    return (voxels + under_way * coarse) * kBytesPerVoxel + wind;
 }
 
 }  // namespace

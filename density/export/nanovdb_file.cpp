@@ -121,6 +121,14 @@ void send_node(SandboxWriter& writer, const CoordBBox& extent, const Node& node)
     }
 }
 
+// The library looks for a grid's type behind as many grids as its index says, wherever that leads.
+void require_one_grid(const nanovdb::GridHandle<>& handle) {
+    const nanovdb::GridMetaData* grid = handle.gridMetaData();
+    if (handle.size() < sizeof(nanovdb::GridData) || grid->gridIndex() != 0 || grid->gridCount() != 1 ||
+        grid->gridSize() != handle.size())
+        throw std::runtime_error("it holds no single whole grid");
+}
+
 template <class Build>
 bool send_grid_of(const nanovdb::GridHandle<>& handle, const CoordBBox& extent, SandboxWriter& writer) {
     const nanovdb::NanoGrid<Build>* grid = handle.grid<Build>();
@@ -141,6 +149,7 @@ void send_grid(int file, const Extent& extent, SandboxWriter& writer) {
     stream.exceptions(std::ios::badbit);  // with the system's error
     const auto handles = nanovdb::io::readGrids(stream);
     const CoordBBox box(openvdb::Coord(0), openvdb::Coord(extent.x - 1, extent.y - 1, extent.z - 1));
+    if (handles.size() == 1) require_one_grid(handles.front());
     const auto is_sent = [&](const nanovdb::GridHandle<>& handle) {
         return send_grid_of<float>(handle, box, writer) || send_grid_of<nanovdb::Fp8>(handle, box, writer) ||
                send_grid_of<nanovdb::Fp16>(handle, box, writer);

@@ -13,7 +13,7 @@
 //     grid          type            content
 //     density       float, half     fog volume, 0..1; the two extreme corners are active with value 0
 //     hum act cld   bool            active and true where the bit is 1; on request
-//     vel           vec3s           wind in m/s (east, north, up), in all voxels of the box; on request
+//     vel           vec3s           wind in m/s (east, north, up), of the whole box, in larger voxels where it has more than 2^24; on request
 //
 // The two corner voxels of `density` make the active bounds, and with them OpenVDB's own `file_bbox_min` and
 // `file_bbox_max`, the same in every file of a sequence, clouds or none. The other grids keep the bounds of
@@ -90,7 +90,8 @@ struct VdbContent {
     bool half = false;  // density as 16-bit floats
     std::optional<BitPlaneView> hum, act, cld;
     Placement cells;  // of the bit planes; must agree with density's placement and extent / refine
-    // Writes the wind by height, one velocity a level of voxels, as a grid of this name; needs density.
+    // Writes the wind by height, one velocity a level of voxels, as a grid of this name, whose voxels are velocity_voxel() of
+    // those of the density; needs density.
     std::vector<Velocity> wind;
     std::string wind_name = "vel";
     // Returns what the wind has in addition at a place of world space, m/s; may be empty. Called in one thread.
@@ -98,6 +99,12 @@ struct VdbContent {
     // Called right before the file is begun and right before it gets its name (PublishCheck); may be empty.
     std::function<void()> publish_check;
 };
+
+// Blocks of 8 x 8 x 8 voxels that a grid of the wind has at most: it covers the whole box, and 2^24 voxels take 210 MB.
+inline constexpr double kMostVelocityBlocks = 32768;
+
+// Returns the edge of the voxels of the wind over a box of voxels: 1, or the least power of two with which they are not more.
+int velocity_voxel(const Extent& voxels);
 
 // Writes atomically (atomic_file.h): the file is complete or absent. Throws Error(usage) when the content
 // contradicts itself, Error(io) naming the path when the file cannot be written (full disk included).

@@ -57,6 +57,14 @@ int refinement(Extent voxels, Extent cells) {
     return refine;
 }
 
+openvdb::math::Transform::Ptr transform_of(const Placement& voxels) {
+    const double size = voxels.cell_size_m;
+    const Vec3 o = voxels.origin_m;
+    const auto transform = openvdb::math::Transform::createLinearTransform(size);
+    transform->postTranslate({o.x + size / 2, o.y + size / 2, o.z + size / 2});
+    return transform;
+}
+
 GridGeometry geometry_of(const VdbContent& content) {
     std::optional<Extent> cells;
     check_plane(content.hum, cells);
@@ -81,10 +89,7 @@ GridGeometry geometry_of(const VdbContent& content) {
         if (ratio >= 1 && std::abs(ratio - std::round(ratio)) < 1e-9)
             geometry.refine = int(std::round(ratio));
     }
-    const double size = geometry.placement.cell_size_m;
-    const Vec3 o = geometry.placement.origin_m;
-    geometry.transform = openvdb::math::Transform::createLinearTransform(size);
-    geometry.transform->postTranslate({o.x + size / 2, o.y + size / 2, o.z + size / 2});
+    geometry.transform = transform_of(geometry.placement);
     return geometry;
 }
 
@@ -165,18 +170,52 @@ BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const GridGeometry& geometry)
     return grid;
 }
 
-// The wind at each voxel's centre of the whole box: it blows where no cloud is, too.
-VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geometry) {
-    if (content.wind.size() != std::size_t(geometry.voxels.z))
-        throw Error(ErrorCode::usage, "a VDB file needs one velocity of the wind a level of voxels");
+// Voxels of the wind over those of a density.
+GridGeometry geometry_of_wind(const GridGeometry& density) {
+    const int edge = velocity_voxel(density.voxels);
+    if (edge == 1) return density;
+    GridGeometry wind = density;
+    const auto fewer = [&](int n) { return (n + edge - 1) / edge; };
+    wind.voxels = {fewer(density.voxels.x), fewer(density.voxels.y), fewer(density.voxels.z)};
+    wind.placement.cell_size_m *= edge;
+    wind.transform = transform_of(wind.placement);
+    return wind;
+}
+
+// The velocities at the middle of the levels of the wind: of larger voxels between two levels of the density.
+std::vector<openvdb::Vec3s> profile_of(const std::vector<Velocity>& levels, int edge, int count) {
     std::vector<openvdb::Vec3s> profile;
-    for (const Velocity& v : content.wind)
-        profile.emplace_back(float(v.east_m_per_s), float(v.north_m_per_s), 0.0f);
+    for (int n = 0; n < count; ++n) {
+        const std::size_t last = levels.size() - 1, upper = std::min(last, std::size_t(n * edge + edge / 2)),
+                          lower = std::min(last, std::size_t(n * edge + (edge - 1) / 2));
+        const Velocity &a = levels[lower], &b = levels[upper];
+        profile.emplace_back(float((a.east_m_per_s + b.east_m_per_s) / 2),
+                             float((a.north_m_per_s + b.north_m_per_s) / 2), 0.0f);
+    }
+    return profile;
+}
+
+// The wind at each voxel's centre of the whole box: it blows where no cloud is, too. Blocks of one velocity are tiles.
+VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& density,
+                              const GridGeometry& geometry) {
+    if (content.wind.size() != std::size_t(density.voxels.z))
+        throw Error(ErrorCode::usage, "a VDB file needs one velocity of the wind a level of voxels");
+    const std::vector<openvdb::Vec3s> profile =
+        profile_of(content.wind, velocity_voxel(density.voxels), geometry.voxels.z);
     auto grid = VectorGrid::create(openvdb::Vec3s(0.0f));
     grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
     openvdb::tree::ValueAccessor<VectorTree> accessor(grid->tree());
     constexpr int kEdge = 8;
+    const auto is_uniform = [&](const openvdb::Coord& origin) {
+        const bool is_inside = origin.x() + kEdge <= geometry.voxels.x &&
+                               origin.y() + kEdge <= geometry.voxels.y &&
+                               origin.z() + kEdge <= geometry.voxels.z;
+        if (content.wind_field || !is_inside) return false;
+        const auto first = profile.begin() + origin.z();
+        return std::all_of(first, first + kEdge, [&](const openvdb::Vec3s& v) { return v == *first; });
+    };
     const auto add_block = [&](const openvdb::Coord& origin) {
+        if (is_uniform(origin)) return accessor.addTile(1, origin, profile[std::size_t(origin.z())], true);
         auto leaf = std::make_unique<VectorLeaf>(origin);
         for (int n = 0; n < kBlockVoxels; ++n) {
             const openvdb::Coord voxel = origin + openvdb::Coord(n >> 6, n >> 3 & 7, n & 7);
@@ -185,7 +224,7 @@ VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geo
                 continue;
             openvdb::Vec3s velocity = profile[std::size_t(voxel.z())];
             if (content.wind_field) {
-                const Placement& at = content.density->placement();
+                const Placement& at = geometry.placement;
                 const Vec3 more = content.wind_field(
                     at.origin_m + at.cell_size_m * (Vec3(voxel.x(), voxel.y(), voxel.z()) + 0.5));
                 velocity += openvdb::Vec3s(openvdb::Vec3d(more.x, more.y, more.z));
@@ -221,8 +260,9 @@ openvdb::GridCPtrVec make_grids(const VdbContent& content, const GridGeometry& g
         grids.push_back(grid);
     }
     if (!content.wind.empty()) {
-        const auto grid = velocity_grid(content, geometry);
-        describe(*grid, content.wind_name.c_str(), geometry, metadata);
+        const GridGeometry of_wind = geometry_of_wind(geometry);
+        const auto grid = velocity_grid(content, geometry, of_wind);
+        describe(*grid, content.wind_name.c_str(), of_wind, metadata);
         grids.push_back(grid);
     }
     return grids;
@@ -279,6 +319,16 @@ void write_file(const std::filesystem::path& temporary, const std::filesystem::p
 }
 
 }  // namespace
+
+int velocity_voxel(const Extent& voxels) {
+    const auto blocks = [&](int edge) {
+        const auto along = [&](int n) { return std::ceil(double(n) / edge / kBlock); };
+        return along(voxels.x) * along(voxels.y) * along(voxels.z);
+    };
+    int edge = 1;
+    while (blocks(edge) > kMostVelocityBlocks) edge *= 2;
+    return edge;
+}
 
 void write_vdb(const std::filesystem::path& path, const VdbContent& content, const VdbMetadata& metadata) {
     openvdb::initialize();

@@ -83,9 +83,8 @@ const ListedExport::Sequence* sequence_of(const ListedExport& list, const std::s
 // Throws Error(io) naming the file, and the value that is not what it must be.
 ListedExport read_export(const std::filesystem::path& folder);
 
-// Returns whether an error is of a file of the export or of a source of one, whose names begin with the folder. Others, as that
-// a part of the program cannot be loaded, are no fault of the export.
-bool is_of_file_in(const std::filesystem::path& folder, const Error& error);
+// Returns whether an error is of this file, or one in this folder, and not of the program, as that a part of it cannot be loaded.
+bool is_of_file(const std::filesystem::path& path, const Error& error);
 
 // Compares the sidecars with the list, and with the box of their sources, where those are there and unchanged; none where there is
 // no sidecar. That of a complete export of volumes must be there.

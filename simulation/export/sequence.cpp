@@ -377,14 +377,16 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
     for (ExportSequence& s : sequences) {
         choose_layout(options, s, notes);
         if (options.velocity_name.empty()) continue;
+        // These have no velocities without the files: a grid of them would say that the air is calm.
         const auto is_of_files = [](const WindField& field) { return field.kind == WindFieldKind::grid; };
-        if (std::ranges::any_of(s.wind_fields, is_of_files))
+        const bool has_files = std::erase_if(s.wind_fields, is_of_files) > 0;
+        if (has_files)
             notes.push_back(s.name + ": the wind that the scene has from files is not in the grid `" +
                             options.velocity_name +
                             "` (density.write_velocity writes it into those of the run)");
         if (s.metadata.wind.empty() && s.wind_fields.empty())
-            notes.push_back(s.name + ": the air is calm: its VDB files have no grid `" +
-                            options.velocity_name + "`");
+            notes.push_back(s.name + (has_files ? ": no other wind blows" : ": the air is calm") +
+                            ": its VDB files have no grid `" + options.velocity_name + "`");
     }
     return sequences;
 }

@@ -14,6 +14,7 @@
 #include "density/export/cloud_picture.h"
 #include "density/export/containers.h"
 #include "simulation/export/export_list.h"
+#include "simulation/verify_problems.h"
 
 namespace nephos {
 namespace {
@@ -68,6 +69,18 @@ double allowed_error(NanoQuantise quantise, const DensityGrid& source) {
     return double(source.max_value()) / (quantise == NanoQuantise::fp8 ? 255 : 65535) / 2 * 1.001 + 1e-6;
 }
 
+// Returns whether a grid lies where it should, but for the rounding of the centre of its first voxel, which is what files hold.
+bool is_at(const Placement& found, const Placement& expected) {
+    constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+    const double size = expected.cell_size_m;
+    if (!(std::abs(found.cell_size_m - size) <= 8 * kEpsilon * size)) return false;
+    for (int a = 0; a < 3; ++a) {
+        const double most = 8 * kEpsilon * (std::abs(expected.origin_m[a]) + size);
+        if (!(std::abs(found.origin_m[a] - expected.origin_m[a]) <= most)) return false;
+    }
+    return true;
+}
+
 // Adds the differences of one file to its source. Returns false for what cannot be compared.
 bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
                   const ListedExport::Sequence& s, const ExportedFile& file, Difference& d) {
@@ -93,7 +106,7 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         const DensityGrid& found = loaded.density;
         if (list.half_voxel_shift)
             for (int a = 0; a < 3; ++a) at.origin_m[a] -= at.cell_size_m / 2;
-        if (!(found.placement() == at)) bad_file(path, "lies at another place than its source");
+        if (!is_at(found.placement(), at)) bad_file(path, "lies at another place than its source");
         const auto type = list.types.find(file.format);
         compare(path, expected.values, found.to_dense(),
                 allowed_error(type == list.types.end() ? VoxelType::r32f : type->second,
@@ -141,8 +154,8 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
 std::vector<Check> check_voxels(const std::filesystem::path& folder, const ListedExport& list) {
     std::map<std::string, Difference> formats;
     std::map<std::string, std::size_t> counts;
-    std::string problem;
-    std::size_t lost = 0, changed = 0, bad = 0, of_sources = 0;
+    Problems bad, unread;
+    std::size_t lost = 0, changed = 0, of_sources = 0;
     for (const ExportedFile& file : list.files) {
         if (file.source.empty()) continue;
         ++of_sources;
@@ -154,11 +167,12 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
         try {
             if (file.source_digest && !(file_digest(folder / file.source) == *file.source_digest)) ++changed;
             if (compare_file(folder, list, *s, file, formats[file.format])) ++counts[file.format];
-        } catch (const ReadFailure&) {
-            throw;
+        } catch (const ReadFailure& failure) {  // which says nothing of its content
+            unread.add(failure.what());
         } catch (const Error& failure) {
-            if (!is_of_file_in(folder, failure)) throw;
-            if (bad++ == 0) problem = failure.what();
+            const bool is_bad = is_of_file(folder / file.path, failure);
+            if (!is_bad && !is_of_file(folder / file.source, failure)) throw;
+            (is_bad ? bad : unread).add(failure.what());
         }
     }
     std::vector<Check> checks;
@@ -173,9 +187,7 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
                          d.cut > 0 ? fmt::format("; {} voxels above the scale are cut to it", d.cut) : ""),
              {{"largest", d.largest}, {"rms", rms}}});
     }
-    if (bad > 0)
-        checks.push_back(
-            {"voxels", false, bad > 1 ? fmt::format("{}; and {} more", problem, bad - 1) : problem});
+    if (!bad.none()) checks.push_back(bad.check("voxels", ""));
     if (changed > 0)
         checks.push_back(
             {"sources", std::ranges::all_of(checks, [](const Check& check) { return check.passed; }),
@@ -190,6 +202,7 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
                          of_sources,
                          lost == of_sources ? "; only checksums and sidecars were looked at" : ""),
              {{"not_compared", double(lost)}, {"of", double(of_sources)}}});
+    if (!unread.none()) checks.push_back(unread.not_done("decoding"));
     return checks;
 }
 
@@ -204,8 +217,8 @@ const ListedExport::Sequence* sequence_of(const ListedExport& list, const std::s
     return best;
 }
 
-bool is_of_file_in(const std::filesystem::path& folder, const Error& error) {
-    return std::string_view(error.what()).starts_with(folder.string());
+bool is_of_file(const std::filesystem::path& path, const Error& error) {
+    return std::string_view(error.what()).starts_with(path.string());
 }
 
 Verification verify_export(const std::filesystem::path& folder, const VerifyOptions& options) {

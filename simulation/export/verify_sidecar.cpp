@@ -11,6 +11,7 @@
 #include "simulation/checked_json.h"
 #include "simulation/export/export_list.h"
 #include "simulation/export/sequence.h"
+#include "simulation/verify_problems.h"
 
 namespace nephos {
 namespace {
@@ -136,8 +137,8 @@ void check_sidecar(const std::filesystem::path& path, const ListedExport& list,
 std::optional<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list) {
     std::set<std::string> listed;
     for (const ExportedFile& file : list.files) listed.insert(file.path.generic_string());
-    std::size_t count = 0, bad = 0, compared = 0;
-    std::string problem;
+    std::size_t count = 0, compared = 0;
+    Problems bad, unread;
     for (const ListedExport::Sequence& s : list.sequences) {
         const std::string name = s.name + ".volume.json";
         try {
@@ -151,21 +152,22 @@ std::optional<Check> check_sidecars(const std::filesystem::path& folder, const L
             const std::optional<LoadedDensity> source = source_of(folder, list, s);
             compared += source.has_value();
             check_sidecar(folder / name, list, s, listed, source);
-        } catch (const ReadFailure&) {
-            throw;
+        } catch (const ReadFailure& failure) {
+            unread.add(failure.what());
         } catch (const Error& error) {
-            if (!is_of_file_in(folder, error)) throw;
-            if (bad++ == 0) problem = error.what();
+            const bool is_bad = is_of_file(folder / name, error) || is_of_file(folder / "export.json", error);
+            if (!is_bad && !is_of_file(folder, error)) throw;
+            (is_bad ? bad : unread).add(error.what());  // of a source
         }
     }
     if (count == 0) return {};
-    if (bad > 1) problem += fmt::format("; and {} more", bad - 1);
+    if (bad.none() && !unread.none()) return unread.not_done("sidecars");
     const char* found =
         compared == count
             ? "box, axes, levels, names, types, scale and frames are those of list and sources"
             : "names, types, scale and frames are those of the list; box, axes and levels were not "
               "compared: sources are not there, or have changed";
-    return Check{"sidecars", bad == 0, bad == 0 ? found : problem};
+    return bad.check("sidecars", found);
 }
 
 }  // namespace nephos

@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "density/metaballs.h"
+#include "density/openvdb_access.h"
 #include "density/smoothing.h"
 #include "density/vdb/vdb_file.h"
 #include "tests/density/naive_smoothing.h"
@@ -194,6 +195,58 @@ TEST(VdbWrite, VelocityIsTheWindAtEachVoxel) {
     }
     EXPECT_GT(checked, 1000);
     EXPECT_EQ(vel->evalActiveVoxelBoundingBox(), density->evalActiveVoxelBoundingBox());
+}
+
+// A box far larger than its clouds, as that of layers from the ground to the cirrus: the wind's voxels are larger.
+TEST(VdbWrite, TheWindOfALargeBoxHasLargerVoxels) {
+    EXPECT_EQ(velocity_voxel({256, 256, 64}), 1);
+    EXPECT_EQ(velocity_voxel({256, 256, 256}), 1);
+    EXPECT_EQ(velocity_voxel({256, 256, 257}), 2);
+    EXPECT_EQ(velocity_voxel({32768, 32768, 1}), 32);
+    const test::TemporaryFolder folder;
+    const Extent extent{4000, 3000, 37};
+    TreeBuilder builder;
+    const DensityGrid density = builder.finish(extent, {{100, 200, 300}, 50});
+    VdbContent content;
+    content.density = &density;
+    for (int k = 0; k < extent.z; ++k) content.wind.push_back({0.5 * k, k < 32 ? -7.0 : 0.0});
+    const auto voxel_of = [&](const char* name) {
+        write_vdb(folder / name, content, {});
+        const test::FileContent file = read_with_openvdb(folder / name);
+        const auto vel = file.get<openvdb::Vec3SGrid>("vel");
+        EXPECT_EQ(vel->voxelSize(), openvdb::Vec3d(200));
+        EXPECT_EQ(vel->evalActiveVoxelBoundingBox(), openvdb::CoordBBox({0, 0, 0}, {999, 749, 9}));
+        EXPECT_LT(vel->memUsage(), std::uint64_t(210) << 20);
+        return [vel](const openvdb::Coord& at) { return vel->getConstAccessor().getValue(at); };
+    };
+    const auto profile = voxel_of("profile.vdb");
+    EXPECT_EQ(profile({7, 9, 2}), openvdb::Vec3s(0.5f * 9.5f, -7, 0));
+    EXPECT_EQ(profile({999, 749, 9}), openvdb::Vec3s(0.5f * 36, 0, 0));
+    content.wind_field = [](const Vec3& at) { return Vec3(at.x, at.y, at.z); };
+    const auto field = voxel_of("field.vdb");
+    EXPECT_EQ(field({7, 9, 2}),
+              openvdb::Vec3s(0.5f * 9.5f + 100 + 7.5f * 200, -7 + 200 + 9.5f * 200, 300 + 2.5f * 200));
+}
+
+// Where it is the same in a whole block it takes no room; what reads it finds it all the same.
+TEST(VdbWrite, UniformWindTakesNoRoom) {
+    const test::TemporaryFolder folder;
+    const Extent extent{100, 64, 24};
+    TreeBuilder builder;
+    const DensityGrid density = builder.finish(extent, {{0, 0, 0}, 50});
+    VdbContent content;
+    content.density = &density;
+    for (int k = 0; k < extent.z; ++k) content.wind.push_back({3, k < 12 ? 1.0 : 2.0});
+    write_vdb(folder / "w.vdb", content, {});
+    const test::FileContent file = read_with_openvdb(folder / "w.vdb");
+    const auto vel = file.get<openvdb::Vec3SGrid>("vel");
+    EXPECT_EQ(vel->activeVoxelCount(), extent.cells());
+    EXPECT_EQ(vel->tree().leafCount(), 13u * 8 + 2 * 8) << "the level that changes, and the edge of the box";
+    const SampleGrid samples = read_samples(folder / "w.vdb", "vel", 3);
+    ASSERT_EQ(samples.points, (std::array<int, 3>{100, 64, 24}));
+    EXPECT_EQ(sample_at(samples, {60, 70, 100}, 1), 1);
+    EXPECT_EQ(sample_at(samples, {4900, 3000, 1100}, 1), 2);
+    EXPECT_EQ(sample_at(samples, {4900, 3000, 1100}, 0), 3);
 }
 
 TEST(VdbWrite, HalfFloatsKeepElevenBits) {

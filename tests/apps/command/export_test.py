@@ -187,6 +187,68 @@ class Export(Case):
                 self.assertAlmostEqual(a, b, 5)
         self.assertGreater(max(map(abs, own.getValue((5, 9, 3)))), 1)
 
+    def test_the_wind_of_files_alone_is_no_calm_air(self):
+        """Without the files there are no velocities: no grid, instead of one of zeros."""
+        import pyopenvdb
+        wind = pyopenvdb.Vec3SGrid()
+        wind.copyFromArray(numpy.full((4, 4, 4, 3), 5, dtype="f4"))
+        wind.name = "vel"
+        wind.transform = pyopenvdb.createLinearTransform(voxelSize=1000)
+        pyopenvdb.write(str(self.folder / "wind.vdb"), [wind])
+        field = "[[wind_field]]\nkind = \"grid\"\nfiles = \"wind.vdb\"\n"
+        self.call("run", self.write("filed.toml", SCENE + field), "--no-render", "--out", "filed")
+        said = self.call("export", "filed", "--to", "vdb", "--velocity", "v", "-o", "alone").stderr
+        self.assertIn("the wind that the scene has from files is not in the grid `v`", said)
+        self.assertIn("no other wind blows: its VDB files have no grid `v`", said)
+        self.assertEqual([grid.name for grid in pyopenvdb.readAllGridMetadata(str(self.folder / "alone/filed_0001.vdb"))], ["density"])
+
+    def test_verify_of_decimal_places(self):
+        """Of cells and origins that binary numbers do not hold: the centre of the first voxel is what files have."""
+        for number, (origin, cell) in enumerate((("[48, -9.06, 6805.16]", 40.1), ("[0.1, 0.2, 0.3]", 30), ("[-600, -600, 1000.1]", 40))):
+            place = ("--set", f"lattice.origin_m={origin}", "--set", f"lattice.cell_size_m={cell}", "--set", "frames.count=1")
+            self.call("run", self.write("tiny.toml", SCENE), "--no-render", *place, "--out", f"place{number}")
+            for more in (["--for", "blender"], ["--to", "vdb", "--size", "7"], ["--to", "vdb", "--voxel", str(2 * cell)], ["--to", "usd", "--velocity", "v"]):
+                out = f"x{number}{more[-1]}"
+                self.call("export", f"place{number}", *more, "-o", out)
+                self.call("verify", out)
+        path = next((self.folder / "x240").glob("*.vdb"), None) or next((self.folder / "x27").glob("*.vdb"))
+        self.assertIn("another place", self.moved(path))
+
+    def moved(self, path):
+        """What verify says of an export whose grid lies a thousandth of a voxel elsewhere, and whose list agrees."""
+        import pyopenvdb
+        grids, metadata = pyopenvdb.readAll(str(path))
+        for grid in grids:
+            grid.transform.translate((0.04, 0, 0))
+        pyopenvdb.write(str(path), grids, metadata)
+        result = subprocess.run([NEPHOS, "verify", str(path.parent)], capture_output=True, text=True, cwd=self.folder, env=self.environment)
+        self.assertEqual(result.returncode, 1)
+        return result.stdout + result.stderr
+
+    def test_verify_tells_all_that_is_damaged(self):
+        """A file that cannot be read takes nothing from what its checksum says, in a moment; the others are judged."""
+        folder = self.export("hit", "--to", "nvdb", "--frames", "1..3")
+        clean = {path: path.read_bytes() for path in folder.glob("*.nvdb")}
+        first = folder / "placed_0001.nvdb"
+        for at, value in ((12, 0x58), (224, 0x10), (225, 1), (227, 0x40), (960, 3), (24, 0xFF)):
+            for path, data in clean.items():
+                path.write_bytes(data)
+            data = bytearray(clean[first])
+            data[at] ^= value
+            first.write_bytes(bytes(data))
+            begin = time.monotonic()
+            result = self.call("verify", "hit", status=1)
+            self.assertIn("placed_0001.nvdb: its bytes are not those that were written", result.stdout + result.stderr, at)
+            self.assertLess(time.monotonic() - begin, 60)
+            told = self.call("verify", "hit", "--json", status=1).stdout
+            self.assertIn("placed_0001.nvdb", json.loads(told)["checks"][2]["detail"])
+        first.write_bytes(clean[first])
+        source = self.folder / "run/density/placed_0002.vdb"
+        whole = source.read_bytes()
+        source.write_bytes(whole[:len(whole) // 2])
+        self.assertNotIn("is not what it claims", self.call("verify", "hit", status=3).stderr)
+        source.write_bytes(whole)
+
     def test_genera_are_those_of_the_models(self):
         """Not of what their names begin with; clouds of no genus are cumulus, which the automaton makes."""
         for name, genus, wanted, xplane in (("Storm", "Cb", "Cb", 3), ("Storm", "none", "", 2), ("Sc-2", "none", "Sc", 1)):

@@ -185,6 +185,24 @@ class Keeping(Case):
         self.assertEqual(len(list((self.folder / "shared").iterdir())), 1)
         self.call("verify", "a")
 
+    def test_layers_in_one_folder_are_refused(self):
+        """By links: the frames of one would replace those of the other. Nothing is written, nothing removed."""
+        scene = self.write("layered.toml", LAYERED.replace("enabled = false", "count = 2") + LAYERED[LAYERED.index("[[layer]]"):].replace("low", "high")
+                           + "[density]\nper_layer = true\n")
+        self.call("run", scene, "--no-render", "--out", "kept")
+        for number, links in enumerate(({"low": "../../disk", "high": "../../disk"}, {"low": "high"}, {"low": "."})):
+            out = f"links{number}"
+            shutil.copytree(self.folder / "kept", self.folder / out)
+            (self.folder / "disk").mkdir(exist_ok=True)
+            for name, target in links.items():
+                shutil.rmtree(self.folder / out / "density" / name)
+                (self.folder / out / "density" / name).symlink_to(target)
+            before = {str(path): path.stat().st_mtime_ns for path in sorted((self.folder / out).rglob("*"))}
+            for more in ([], ["--overwrite"], ["--seed", "9", "--overwrite"]):
+                self.refused(2, "run", scene, "--no-render", "--out", out, *more, says="are one folder")
+            after = {str(path): path.stat().st_mtime_ns for path in sorted((self.folder / out).rglob("*"))}
+            self.assertEqual(before, after)
+
     def test_a_frame_that_is_not_what_was_written(self):
         self.call(*self.plain, "--out", "out")
         frame = self.folder / "out/density/tiny_0001.vdb"
