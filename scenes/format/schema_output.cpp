@@ -120,8 +120,10 @@ const Section& density_section() {
                                             "keep them so; compressed files are about as large."),
          density_key<&DensityOptions::write_state>("write_state", "", kAny,
                                                    "Write also the bool grids `hum`, `act` and `cld`."),
-         density_key<&DensityOptions::write_velocity>("write_velocity", "", kAny,
-                                                      "Write also the wind as the grid `vel`, in m/s."),
+         density_key<&DensityOptions::write_velocity>(
+             "write_velocity", "", kAny,
+             "Write also the wind as the grid `vel`, in m/s, over the whole box: in voxels twice, four "
+             "times, .. as large where those would be more than 2^24."),
          written_if(
              key<&Scene::density_files, &DensityFileOptions::velocity_name>(
                  "velocity_name", "", kAny,

@@ -34,4 +34,9 @@ std::string indent_at(std::string_view text, std::size_t at) {
     return std::string(text.substr(begin, std::min(first, at) - begin));
 }
 
+std::size_t after_comma(std::string_view text, std::size_t end) {
+    const std::size_t next = text.find_first_not_of(" \t\r\n", end);
+    return next != kNone && text[next] == ',' ? next + 1 : end;
+}
+
 }  // namespace nephos

@@ -27,4 +27,7 @@ std::string newline_of(std::string_view text);
 // Returns the blanks at the start of the line of `at`.
 std::string indent_at(std::string_view text, std::size_t at);
 
+// Returns where the comma after an item ends, without skipping a comment; the item's end where there is none.
+std::size_t after_comma(std::string_view text, std::size_t end);
+
 }  // namespace nephos

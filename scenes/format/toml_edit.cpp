@@ -9,7 +9,6 @@
 #include "core/error.h"
 #include "scenes/format/text.h"
 #include "scenes/format/toml_change.h"
-#include "scenes/format/toml_items.h"
 
 namespace nephos {
 namespace {
@@ -266,6 +265,58 @@ const TomlNode* find_node(const TomlNode& root, const TextPath& path) {
     const Reached reached = reach(root, path);
     return reached.steps == path.size() ? reached.node : nullptr;
 }
+
+namespace {
+
+// Returns the text with items of an array more or less, and all else in it as it was, comments too; nothing where the array at
+// `path` is to be as long as it was, where none of its items stays, or where it is so long that finding those takes too much time.
+std::optional<std::string> with_items(std::string_view text, const TextPath& path, const TomlNode& array,
+                                      std::string_view value, NumberForm form) {
+    if (array.form != Form::array || !value.starts_with('[')) return std::nullopt;
+    const std::string whole = "v = " + std::string(value);
+    const TomlNode parsed = toml_tree(whole);
+    const auto texts_of = [](std::string_view in, const std::vector<TomlNode>& items) {
+        std::vector<std::string_view> texts;
+        for (const TomlNode& item : items)
+            texts.push_back(in.substr(item.value.begin, item.value.end - item.value.begin));
+        return texts;
+    };
+    const std::vector<std::string_view> was = texts_of(text, array.items),
+                                        now = texts_of(whole, parsed.find("v")->items);
+    if (was.size() == now.size()) return std::nullopt;
+    const auto found = common_items(was, now, form);
+    if (!found) return std::nullopt;
+    const std::size_t kept = was.size() - std::size_t(std::ranges::count(*found, kNone));
+    if (kept == 0 && !was.empty() && !now.empty()) return std::nullopt;
+    std::string out(text);
+    TextPath item = path;
+    item.push_back({});
+    for (std::size_t n = was.size(); n-- > 0;) {
+        item.back().index = n;
+        if ((*found)[n] == kNone) out = without(out, item);
+    }
+    // Begin with the last one: what stands before it stays where it is.
+    const TomlNode root = toml_tree(out);
+    const TomlNode& left = *find_node(root, path);
+    std::vector<std::size_t> places;
+    std::ranges::copy_if(*found, std::back_inserter(places),
+                         [](std::size_t place) { return place != kNone; });
+    std::size_t next = places.size();  // of those that stay, the one behind `k`
+    for (std::size_t k = now.size(); k-- > 0;) {
+        const std::string more(now[k]);
+        if (next > 0 && places[next - 1] == k)
+            --next;
+        else if (next > 0)
+            out = applied(out, added_behind(out, left.items[next - 1].value, more));
+        else if (kept > 0)
+            out = applied(out, {added_before(out, left.items.front().value, more)});
+        else
+            out.insert(left.value.begin + 1, k + 1 < now.size() ? more + ", " : more);
+    }
+    return out;
+}
+
+}  // namespace
 
 std::string with_value(std::string_view text, const TextPath& path, std::string_view value, NumberForm form) {
     const TomlNode root = toml_tree(text);

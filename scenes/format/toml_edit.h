@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "scenes/format/toml_items.h"
 #include "scenes/format/toml_tree.h"
 
 namespace nephos {
@@ -37,10 +38,6 @@ std::string path_text(const TextPath& path);
 
 // Returns the node at a path; null when it is not there.
 const TomlNode* find_node(const TomlNode& root, const TextPath& path);
-
-// The numbers that a key takes. One that is set to itself keeps its form: `1.0e3` where 1000 is set, but for integers, where
-// 1 mends a `1.0`.
-enum class NumberForm { any, integer };
 
 // Sets a key to a value, which is TOML on one line. A key that is not there is added: to its table after the last key,
 // or in a new section at the end. Of an array only the items change that differ, come or go: comments between the others stay. Those of

@@ -65,13 +65,14 @@ std::size_t comma_behind_comment(std::string_view text, std::size_t end) {
     }
 }
 
-// Whether nothing but blanks stands before `at` on its line.
+// Returns whether nothing but blanks stands before `at` on its line.
 bool begins_line(std::string_view text, std::size_t at) {
     const std::size_t newline = at == 0 ? kNone : text.rfind('\n', at - 1);
     const std::size_t begin = newline == kNone ? 0 : newline + 1;
     return text.substr(begin, at - begin).find_first_not_of(" \t") == kNone;
 }
-// The offset after the newline when only blanks and a comment follow on the line; otherwise kNone.
+
+// Returns the offset after the newline when only blanks and a comment follow on the line; otherwise kNone.
 std::size_t rest_of_line(std::string_view text, std::size_t at) {
     const std::size_t next = std::min(text.find_first_not_of(" \t\r", at), text.size());
     if (next < text.size() && text[next] != '\n' && text[next] != '#') return kNone;
@@ -97,47 +98,7 @@ Change without_item(std::string_view text, const TextRegion& item, std::optional
     return {{same_line ? *end_before : item.begin, same_line ? item.end : comma}, ""};
 }
 
-// Adds an item before another one, likewise.
-Change added_before(std::string_view text, const TextRegion& other, const std::string& item) {
-    if (!begins_line(text, other.begin)) return {{other.begin, other.begin}, item + ", "};
-    return {{other.begin, other.begin}, item + "," + newline_of(text) + indent_at(text, other.begin)};
-}
-
-// Returns, for each item of an array, the place among `now` of the one that it is, or kNone: the longest common sequence.
-// Nothing for arrays that are so long that it takes too much time.
-std::optional<std::vector<std::size_t>> common_items(const std::vector<std::string_view>& was,
-                                                     const std::vector<std::string_view>& now,
-                                                     NumberForm form) {
-    constexpr std::size_t kMostPairs = 4'000'000;
-    if (was.size() * now.size() > kMostPairs) return std::nullopt;
-    const std::size_t width = now.size() + 1;
-    std::vector<std::uint16_t> longest((was.size() + 1) * width, 0);  // of the rests
-    for (std::size_t i = was.size(); i-- > 0;) {
-        for (std::size_t k = now.size(); k-- > 0;) {
-            const std::size_t at = i * width + k;
-            longest[at] = stays(was[i], now[k], form) ? std::uint16_t(longest[at + width + 1] + 1)
-                                                      : std::max(longest[at + width], longest[at + 1]);
-        }
-    }
-    std::vector<std::size_t> found(was.size(), kNone);
-    for (std::size_t i = 0, k = 0; i < was.size() && k < now.size();) {
-        const std::size_t at = i * width + k;
-        if (stays(was[i], now[k], form))
-            found[i++] = k++;
-        else if (longest[at + width] >= longest[at + 1])
-            ++i;
-        else
-            ++k;
-    }
-    return found;
-}
-
 }  // namespace
-
-std::size_t after_comma(std::string_view text, std::size_t end) {
-    const std::size_t next = text.find_first_not_of(" \t\r\n", end);
-    return next != kNone && text[next] == ',' ? next + 1 : end;
-}
 
 std::vector<Change> replaced_value(std::string_view text, const TomlNode& node, std::string_view value,
                                    NumberForm form) {
@@ -181,50 +142,36 @@ std::vector<Change> added_behind(std::string_view text, const TextRegion& other,
     return changes;
 }
 
-std::optional<std::string> with_items(std::string_view text, const TextPath& path, const TomlNode& array,
-                                      std::string_view value, NumberForm form) {
-    if (array.form != Form::array || !value.starts_with('[')) return std::nullopt;
-    const std::string whole = "v = " + std::string(value);
-    const TomlNode parsed = toml_tree(whole);
-    const auto texts_of = [](std::string_view in, const std::vector<TomlNode>& items) {
-        std::vector<std::string_view> texts;
-        for (const TomlNode& item : items)
-            texts.push_back(in.substr(item.value.begin, item.value.end - item.value.begin));
-        return texts;
-    };
-    const std::vector<std::string_view> was = texts_of(text, array.items),
-                                        now = texts_of(whole, parsed.find("v")->items);
-    if (was.size() == now.size()) return std::nullopt;
-    const auto found = common_items(was, now, form);
-    if (!found) return std::nullopt;
-    const std::size_t kept = was.size() - std::size_t(std::ranges::count(*found, kNone));
-    if (kept == 0 && !was.empty() && !now.empty()) return std::nullopt;
-    std::string out(text);
-    TextPath item = path;
-    item.push_back({});
-    for (std::size_t n = was.size(); n-- > 0;) {
-        item.back().index = n;
-        if ((*found)[n] == kNone) out = without(out, item);
+Change added_before(std::string_view text, const TextRegion& other, const std::string& item) {
+    if (!begins_line(text, other.begin)) return {{other.begin, other.begin}, item + ", "};
+    return {{other.begin, other.begin}, item + "," + newline_of(text) + indent_at(text, other.begin)};
+}
+
+std::optional<std::vector<std::size_t>> common_items(const std::vector<std::string_view>& was,
+                                                     const std::vector<std::string_view>& now,
+                                                     NumberForm form) {
+    constexpr std::size_t kMostPairs = 4'000'000;
+    if (was.size() * now.size() > kMostPairs) return std::nullopt;
+    const std::size_t width = now.size() + 1;
+    std::vector<std::uint16_t> longest((was.size() + 1) * width, 0);  // of the rests
+    for (std::size_t i = was.size(); i-- > 0;) {
+        for (std::size_t k = now.size(); k-- > 0;) {
+            const std::size_t at = i * width + k;
+            longest[at] = stays(was[i], now[k], form) ? std::uint16_t(longest[at + width + 1] + 1)
+                                                      : std::max(longest[at + width], longest[at + 1]);
+        }
     }
-    // Begin with the last one: what stands before it stays where it is.
-    const TomlNode root = toml_tree(out);
-    const TomlNode& left = *find_node(root, path);
-    std::vector<std::size_t> places;
-    std::ranges::copy_if(*found, std::back_inserter(places),
-                         [](std::size_t place) { return place != kNone; });
-    std::size_t next = places.size();  // of those that stay, the one behind `k`
-    for (std::size_t k = now.size(); k-- > 0;) {
-        const std::string more(now[k]);
-        if (next > 0 && places[next - 1] == k)
-            --next;
-        else if (next > 0)
-            out = applied(out, added_behind(out, left.items[next - 1].value, more));
-        else if (kept > 0)
-            out = applied(out, {added_before(out, left.items.front().value, more)});
+    std::vector<std::size_t> found(was.size(), kNone);
+    for (std::size_t i = 0, k = 0; i < was.size() && k < now.size();) {
+        const std::size_t at = i * width + k;
+        if (stays(was[i], now[k], form))
+            found[i++] = k++;
+        else if (longest[at + width] >= longest[at + 1])
+            ++i;
         else
-            out.insert(left.value.begin + 1, k + 1 < now.size() ? more + ", " : more);
+            ++k;
     }
-    return out;
+    return found;
 }
 
 }  // namespace nephos
