@@ -36,8 +36,8 @@ std::optional<FileIdentity> identity_behind(const std::filesystem::path& path);
 // Returns whether two paths, links followed, lead to one file or folder; false where either is not there. Throws as these.
 bool is_same_place(const std::filesystem::path& a, const std::filesystem::path& b);
 
-// Returns the names of what a folder holds, sorted; none where there is no folder. Throws, also for links in a circle, ReadFailure where it cannot be read to
-// its end: what it holds is then not known, and none of it may be taken for missing.
+// Returns the names of what a folder holds, sorted; none where there is no folder. Throws ReadFailure, also for links in a circle,
+// where it cannot be read to its end: what it holds is then not known, and none of it may be taken for missing.
 std::vector<std::string> names_in_folder(const std::filesystem::path& folder);
 
 // Returns the path without "." and "..": by its text where that leads to the same file as the system's way, otherwise, where

@@ -30,7 +30,6 @@ constexpr double kGrids = 3;              // two steps and the frame between the
 constexpr double kBytesPerVoxel = 4.5;    // a float, and the masks and nodes of the tree above it
 constexpr double kBytesPerCoverage = 48;   // a CoverageField and the cells that it is made of, by cell
 constexpr double kBytesPerMarchedLight = 100;  // the light of a cell, and what computing it takes
-constexpr double kBytesPerVelocity = 13;  // three floats and the same
 constexpr double kBytesPerBits = 1;       // hum, act and cld with their masks and nodes
 constexpr double kPlannedCover = 0.5;     // fraction of voxels that are metaballs
 // Itself twice, its colour, its keys while sorting, on the device too.
@@ -57,11 +56,6 @@ std::string advice(const MemoryEstimate& estimate) {
 double voxels_in_blocks(const Extent& cells, int refine) {
     const auto along = [&](int n) { return std::ceil(double(n) * refine / 8) * 8; };
     return along(cells.x) * along(cells.y) * along(cells.z);
-}
-
-// A grid of the wind, of so many voxels in blocks.
-double velocity_bytes(double voxels) {
-    return kBytesPerVelocity * std::min(voxels, 512 * kMostVelocityBlocks);
 }
 
 // Cells around which a CoverageField has samples, when there is cloud in every brick.

@@ -2,7 +2,6 @@
 #include "simulation/run_folder.h"
 
 #include <algorithm>
-#include <cctype>
 #include <chrono>
 #include <exception>
 #include <map>
@@ -142,27 +141,16 @@ bool encode(const Simulation& simulation, RunRecorder& recorder, const RunSettin
     return true;
 }
 
-bool is_same_word(const std::string& a, const std::string& b) {
-    return std::ranges::equal(
-        a, b, {}, [](unsigned char c) { return std::tolower(c); },
-        [](unsigned char c) { return std::tolower(c); });
-}
-
-// Throws Error(usage) where folders of layers are one, by links or on a disk for which upper and lower case are the same: the
-// frames of one layer would replace those of another.
-void require_folders_apart(const RunFolder& folder, const Scene& scene) {
+// Makes the folders of density files. Throws Error(usage) where those of layers are one, by links or on a disk for which upper and
+// lower case are the same: the frames of one layer would replace those of another.
+void make_density_folders(const RunFolder& folder, const Scene& scene) {
     std::map<FileIdentity, std::filesystem::path> known;
-    std::vector<std::filesystem::path> folders;
-    for (const std::filesystem::path& file : density_files(folder, scene, 1))
-        folders.push_back(file.parent_path());
-    for (const std::filesystem::path& each : folders) {
-        const auto is_like = [&](const std::filesystem::path& other) {
-            return is_same_word(other.string(), each.string());
-        };
-        if (std::ranges::count_if(folders, is_like) > 1) create_folders(each);  // only then it can be told
-        const std::optional<FileIdentity> place = identity_behind(each);
-        if (!place) continue;
-        const auto [found, is_new] = known.try_emplace(*place, each);
+    for (const std::filesystem::path& file : density_files(folder, scene, 1)) {
+        const std::filesystem::path each = file.parent_path();
+        create_folders(each);
+        const std::optional<FileIdentity> identity = identity_behind(each);
+        if (!identity) continue;  // removed meanwhile, which whoever writes there will find
+        const auto [found, is_new] = known.try_emplace(*identity, each);
         if (!is_new)
             throw Error(ErrorCode::usage,
                         fmt::format("{} and {} are one folder: the frames of one layer would replace those "
@@ -255,7 +243,6 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
 
     const auto lock = std::make_shared<const FolderLock>(folder.folder, "run");
     recorder.set_guard([lock] { lock->require_in_place(); });
-    require_folders_apart(folder, settings.scene);
     const Resumption resumption = found();  // once more: another run may have been at work until now
     if (resumption == Resumption::complete) return report_of_complete(settings, folder);
     settings.resume = resumption == Resumption::go_on;
@@ -264,6 +251,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         refuse_to_remove_inputs(folder, inputs);
         if (!settings.overwrite) refuse_to_lose(folder, settings, inputs, resumption);
     }
+    if (settings.range.last_frame >= settings.range.first_frame) make_density_folders(folder, settings.scene);
     if (lock->held()) remove_leftovers(folder);
     Simulation& simulation =
         made.emplace(settings.resume   ? resumed_simulation(settings, folder, inputs)

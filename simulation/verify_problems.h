@@ -16,6 +16,8 @@ namespace nephos {
 class Problems {
   public:
     void add(const std::string& text) {
+        if (text == last_) return;  // one source of several files
+        last_ = text;
         if (++count_ <= kNamed) text_ += (text_.empty() ? "" : "; ") + text;
     }
     bool none() const { return count_ == 0; }
@@ -32,7 +34,7 @@ class Problems {
         return count_ > kNamed ? fmt::format("{}; and {} more", text_, count_ - kNamed) : text_;
     }
     std::size_t count_ = 0;
-    std::string text_;
+    std::string text_, last_;
 };
 
 }  // namespace nephos

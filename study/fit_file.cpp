@@ -136,7 +136,10 @@ void read_parameter(TomlTable& parameter, const SweepOptions& base, std::optiona
     for (std::string& key : to.keys) {
         key = canonical_key(key);
         if (check_key(parameter, key, known)) sound.push_back(key);
-        if (measured && key.starts_with(measured->cells)) measured->varies = true;
+        // Layers without keys of their own have those of the scene.
+        const bool is_of_cells =
+            measured && (key.starts_with(measured->cells) || key.starts_with("lattice.cell"));
+        if (is_of_cells) measured->varies = true;
     }
     bool has_prior = false;
     parameter.table("prior", [&](TomlTable& prior) {

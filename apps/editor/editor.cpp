@@ -105,6 +105,7 @@ void look_after_files(Editor& editor) {
         attempt(editor, [&] {
             const SceneDocument::Disk disk = editor.document->look_at_disk();
             if (disk == SceneDocument::Disk::reloaded) {
+                follow_document(editor);  // what is recorded below is a change of this one
                 leave_number_field();
                 say(editor, "Another program changed the file: it was read again");
             }
@@ -248,7 +249,7 @@ int loop(Editor& editor, Report& report) {
         last_frame = Clock::now();
         if (scripted && script.is_active()) script.apply(editor);
         for (std::filesystem::path& path : editor.window->take_dropped()) dropped.push_back(std::move(path));
-        if (!dropped.empty() && !press_enter_in_field()) {  // likewise
+        if (!dropped.empty() && !press_enter_in_field() && !is_refusal_unseen(editor)) {  // likewise
             for (const std::filesystem::path& path : dropped) ask_before(editor, Pending::open, path);
             dropped.clear();
         }

@@ -35,7 +35,9 @@ void set_value(Editor& editor, const TextPath& path, const std::string& value, b
     const bool is_at_work =
         ImGui::IsAnyItemActive() || (editor.recorded_value && editor.recorded_value->path == path);
     if (is_recorded_when_left(editor, path) && is_at_work) {
-        editor.recorded_value = {path, value, form};
+        const bool goes_on = editor.recorded_value && editor.recorded_value->path == path;
+        const auto before = goes_on ? editor.recorded_value->before : value_now(editor, path);
+        editor.recorded_value = {path, value, form, before};
         return;
     }
     set_values(editor, TextPath(path.begin(), path.end() - 1), {{path.back().name, value}}, dragging, form);
@@ -47,7 +49,8 @@ void finish_recorded_value(Editor& editor) {
     bool is_other = false;  // not where it was changed back
     attempt(editor, [&] {
         const std::string& text = editor.document->text();
-        is_other = with_value(text, done.path, done.value, done.form) != text;
+        is_other = done.before ? *done.before != done.value
+                               : with_value(text, done.path, done.value, done.form) != text;
     });
     if (is_other)
         set_values(editor, TextPath(done.path.begin(), done.path.end() - 1),

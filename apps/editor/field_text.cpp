@@ -107,6 +107,12 @@ std::string with_lines(std::string_view text, std::string_view lines, std::strin
     return out.append(text.substr(place_of(text, lines.size() - behind)));
 }
 
+// Returns whether a field of a number has the caret. ImGui leaves the comma out of what is typed there, and 12,5 would be 125.
+bool is_number_field_active() {
+    const ImGuiContext& g = *ImGui::GetCurrentContext();
+    return g.ActiveId != 0 && g.ActiveId == g.TempInputId;
+}
+
 // The field that had the caret last: what it was given, and what it gave back. Of ImGui as a whole, which has one state of fields.
 struct LastField {
     ImGuiID id = 0;
@@ -216,8 +222,8 @@ std::string text_of_field(std::string_view field) {
 ImGuiID active_item() { return ImGui::GetActiveID(); }
 
 void leave_number_field() {
+    if (!is_number_field_active()) return;
     ImGuiContext& g = *ImGui::GetCurrentContext();
-    if (g.ActiveId == 0 || g.ActiveId != g.TempInputId) return;
     ImGui::ClearActiveID();
     g.ActiveIdPreviousFrameHasBeenEditedBefore = false;  // what was typed is not taken
     g.InputTextState.ID = 0;
@@ -288,11 +294,6 @@ void hold_back(HeldInput& held, ImGuiIO& io) {
 
 void finish_field_first() {
     ImGuiIO& io = ImGui::GetIO();
-    // ImGui leaves the comma of a number out, and 12,5 would be 125.
-    const ImGuiContext& context = *ImGui::GetCurrentContext();
-    if (context.ActiveId != 0 && context.ActiveId == context.TempInputId)
-        for (ImWchar& c : io.InputQueueCharacters)
-            if (c == ',') c = '.';
     HeldInput& held = held_input();
     if (held.stage != Waiting::none) {
         held.typed.insert(held.typed.end(), io.InputQueueCharacters.begin(), io.InputQueueCharacters.end());
@@ -323,6 +324,9 @@ void finish_field_first() {
         for (const ImWchar c : held.typed) io.InputQueueCharacters.push_back(c);
         held = {};
     }
+    if (is_number_field_active())
+        for (ImWchar& c : io.InputQueueCharacters)
+            if (c == ',') c = '.';
     ImGuiContext& g = *ImGui::GetCurrentContext();
     if (g.InputTextState.ID != 0 && g.ActiveId != g.InputTextState.ID) g.InputTextState.ID = 0;
 }
@@ -398,6 +402,7 @@ void keep_clipboard_apart() {
         const char* text = clipboard.get(clipboard.data);
         if (text == nullptr) return nullptr;
         clipboard.field = field_text(text);
+        if (is_number_field_active()) std::ranges::replace(clipboard.field, ',', '.');
         return clipboard.field.c_str();
     };
     io.SetClipboardTextFn = [](void*, const char* field) {

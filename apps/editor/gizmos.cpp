@@ -228,7 +228,7 @@ void scatter_gizmo(Editor& editor, const TextPath& path, const EllipsoidScatter&
     const double at = place ? place->value[axis] : centre[axis],
                  reach = size ? size->value[axis] : half[axis];
     const std::string range =
-        reach <= 1 && !size  // flat, as it was
+        low[axis] == high[axis] && !size  // flat, as it was
             ? number_of(editor, at)
             : "[" + number_of(editor, at - reach) + ", " + number_of(editor, at + reach) + "]";
     drag_values(editor, path, {{kRanges[axis], range}});
@@ -238,7 +238,9 @@ void scatter_gizmo(Editor& editor, const TextPath& path, const EllipsoidScatter&
 
 bool gizmos(Editor& editor) {
     const std::optional<Scene>& now = editor.document->scene();
-    if (!editor.show_gizmos || !now || editor.selected.empty()) return false;
+    // While the text has problems the scene is that of an earlier one, whose elements may stand elsewhere in this one.
+    const bool is_of_text = now && editor.document->problems().empty();
+    if (!editor.show_gizmos || !is_of_text || editor.selected.empty()) return false;
     const std::string& section = editor.selected.front().name;
     if (section == "model" && editor.selected.size() >= 2) {
         model_gizmo(editor);

@@ -13,7 +13,8 @@ namespace {
 
 // Keeps what the mouse holds, and where that has got to.
 struct Grip {
-    std::string name;  // empty: nothing
+    std::string name;       // empty: nothing
+    bool is_moved = false;  // a mere click changes nothing
     double value = 0;
     Vec3 place{};
 };
@@ -26,8 +27,10 @@ bool knob(Editor& editor, const std::string& name, const ImVec2& at, ImU32 colou
     const bool near = std::hypot(mouse.x - at.x, mouse.y - at.y) < 1.6f * radius;
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) grip.name.clear();
     taken = near && ImGui::IsMouseClicked(ImGuiMouseButton_Left) && grip.name.empty();
-    if (taken) grip.name = name;
+    if (taken) grip = {name, false, 0, {}};
     const bool mine = grip.name == name;
+    constexpr float kFewPixels = 2;
+    if (mine && ImGui::IsMouseDragging(ImGuiMouseButton_Left, kFewPixels)) grip.is_moved = true;
     ImDrawList& list = *ImGui::GetWindowDrawList();
     list.AddCircleFilled(at, mine || near ? 1.25f * radius : radius, colour);
     list.AddCircle(at, radius, IM_COL32(0, 0, 0, 160));
@@ -103,7 +106,7 @@ std::optional<double> axis_handle(Editor& editor, const std::string& name, const
     if (!knob(editor, name, *b, colour, taken)) return std::nullopt;
     if (taken) grip.value = value;
     grip.value += along(ImVec2(b->x - a->x, b->y - a->y), size_m);
-    return grip.value;
+    return grip.is_moved ? std::optional(grip.value) : std::nullopt;
 }
 
 std::optional<double> angle_handle(Editor& editor, const std::string& name,
@@ -115,7 +118,7 @@ std::optional<double> angle_handle(Editor& editor, const std::string& name,
     if (!knob(editor, name, *at, colour, taken)) return std::nullopt;
     if (taken) grip.value = value_deg;
     grip.value += along(ImVec2(next->x - at->x, next->y - at->y), kStep);
-    return grip.value;
+    return grip.is_moved ? std::optional(grip.value) : std::nullopt;
 }
 
 std::optional<Vec3> free_handle(Editor& editor, const std::string& name, const Vec3& place, ImU32 colour) {
@@ -130,7 +133,7 @@ std::optional<Vec3> free_handle(Editor& editor, const std::string& name, const V
     const double scale = 2 * axes.half_height * depth / camera.height;  // metres a pixel there
     const ImVec2 by = ImGui::GetIO().MouseDelta;
     grip.place = grip.place + (scale * double(by.x)) * axes.right - (scale * double(by.y)) * axes.up;
-    return grip.place;
+    return grip.is_moved ? std::optional(grip.place) : std::nullopt;
 }
 
 double tidy_m(const Editor& editor, double metres) {

@@ -196,6 +196,12 @@ std::size_t wind_length(const TextPath& path) {
     return path.size() > 2 && path[0].name == "layer" && path[2].name == "wind" ? 3 : 0;
 }
 
+// Returns whether a path leads to a number of a wind's key frame, other than its time.
+bool is_of_wind(const TextPath& path) {
+    const std::size_t length = wind_length(path);
+    return length > 0 && path.size() > length + 1 && path.back().name != "time_s";
+}
+
 // The wind of a scene at such a path.
 const Wind& wind_at_path(const Scene& scene, const TextPath& path) {
     return path.size() == 1 ? scene.automaton.wind : scene.layers.at(path[1].index).wind;
@@ -268,11 +274,6 @@ bool is_recorded(const Editor& editor, const TextPath& path) {
 Sun sun_now(const Editor& editor) {
     return scene_sun_at(*editor.shown_scene,
                         double(shown_step(editor)) * editor.shown_scene->automaton.time_step_s);
-}
-
-bool is_of_wind(const TextPath& path) {
-    const std::size_t length = wind_length(path);
-    return length > 0 && path.size() > length + 1 && path.back().name != "time_s";
 }
 
 bool is_recorded_when_left(const Editor& editor, const TextPath& path) {

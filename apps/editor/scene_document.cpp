@@ -72,7 +72,10 @@ bool SceneDocument::edit(std::string text, const std::string& what, const std::s
     if (merges) {
         history_[at_].text = std::move(text);
     } else {
-        history_.resize(at_ + 1);
+        end_merging();
+        const auto undone = history_.begin() + std::ptrdiff_t(at_) + 1;
+        if (!merge.empty()) undone_.assign(undone, history_.end());
+        history_.erase(undone, history_.end());
         history_.push_back({std::move(text), what});
         ++at_;
     }
@@ -88,12 +91,18 @@ bool SceneDocument::edit(std::string text, const std::string& what, const std::s
     return true;
 }
 
+void SceneDocument::end_merging() {
+    merge_.clear();
+    undone_.clear();
+}
+
 bool SceneDocument::take_back(const std::string& merge) {
     if (merge.empty() || merge != merge_ || at_ == 0 || at_ + 1 != history_.size()) return false;
     history_bytes_ -= history_.back().text.size();
     history_.pop_back();
     --at_;
-    merge_.clear();
+    history_.insert(history_.end(), undone_.begin(), undone_.end());
+    end_merging();
     read();
     return true;
 }
@@ -101,14 +110,14 @@ bool SceneDocument::take_back(const std::string& merge) {
 void SceneDocument::undo() {
     if (!can_undo()) return;
     --at_;
-    merge_.clear();
+    end_merging();
     read();
 }
 
 void SceneDocument::redo() {
     if (!can_redo()) return;
     ++at_;
-    merge_.clear();
+    end_merging();
     read();
 }
 
@@ -145,7 +154,7 @@ void SceneDocument::save_as(const fs::path& path) {
     } catch (const Error&) {
         // It was saved; look_at_disk() says what became of it.
     }
-    merge_.clear();
+    end_merging();
     if (moved) read();  // names of files in it are relative to its folder
 }
 

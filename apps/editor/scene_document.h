@@ -47,8 +47,9 @@ class SceneDocument {
     // step: those of one drag of a slider. Returns false when nothing changes.
     bool edit(std::string text, const std::string& what, const std::string& merge = {});
     // Ends such a row.
-    void end_merging() { merge_.clear(); }
-    // Takes such a step back as if it had never been, if it is the last one and goes on. Returns whether it did.
+    void end_merging();
+    // Takes such a step back as if it had never been, if it is the last one and goes on: what could be done again before can be
+    // again. Returns whether it did.
     bool take_back(const std::string& merge);
 
     bool can_undo() const { return at_ > 0; }
@@ -106,6 +107,7 @@ class SceneDocument {
     std::filesystem::path autosave_folder(const std::filesystem::path& folder) const;
 
     std::vector<Version> history_;
+    std::vector<Version> undone_;  // what could be done again before the step that goes on
     std::size_t at_ = 0, history_bytes_ = 0;
     std::string merge_, saved_text_;
     std::filesystem::path path_;

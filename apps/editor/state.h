@@ -216,10 +216,11 @@ struct Editor : OpenScene {
         TextPath path;
         std::string value;
         NumberForm form = NumberForm::any;
+        std::optional<std::string> before;  // of one that key frames stand for
     };
     std::optional<RecordedValue> recorded_value;
-    ImGuiID merged_item =
-        0;  // had the mouse or the caret in the frame before: its edits are one step of undo
+    // What had the mouse or the caret in the frame before: its edits are one step of undo.
+    ImGuiID merged_item = 0;
     std::chrono::steady_clock::time_point message_time, last_disk_look, last_autosave;
     std::string rates;  // in the status bar, from time to time: one that changes in every frame cannot be read
     std::chrono::steady_clock::time_point rates_time;

@@ -13,7 +13,7 @@
 //     grid          type            content
 //     density       float, half     fog volume, 0..1; the two extreme corners are active with value 0
 //     hum act cld   bool            active and true where the bit is 1; on request
-//     vel           vec3s           wind in m/s (east, north, up), of the whole box, in larger voxels where it has more than 2^24; on request
+//     vel           vec3s           wind in m/s (east, north, up), in the whole box, in voxels of velocity_voxel(); on request
 //
 // The two corner voxels of `density` make the active bounds, and with them OpenVDB's own `file_bbox_min` and
 // `file_bbox_max`, the same in every file of a sequence, clouds or none. The other grids keep the bounds of
@@ -100,11 +100,12 @@ struct VdbContent {
     std::function<void()> publish_check;
 };
 
-// Blocks of 8 x 8 x 8 voxels that a grid of the wind has at most: it covers the whole box, and 2^24 voxels take 210 MB.
-inline constexpr double kMostVelocityBlocks = 32768;
-
-// Returns the edge of the voxels of the wind over a box of voxels: 1, or the least power of two with which they are not more.
+// Returns the edge of the voxels of the wind over a box of voxels: 1, or the least power of two with which they are no more than
+// 2^24, in blocks of 8 x 8 x 8.
 int velocity_voxel(const Extent& voxels);
+
+// Returns the most memory, in bytes, that such a grid takes over so many voxels in blocks.
+double velocity_bytes(double voxels);
 
 // Writes atomically (atomic_file.h): the file is complete or absent. Throws Error(usage) when the content
 // contradicts itself, Error(io) naming the path when the file cannot be written (full disk included).

@@ -320,6 +320,8 @@ void write_file(const std::filesystem::path& temporary, const std::filesystem::p
 
 }  // namespace
 
+constexpr double kMostVelocityBlocks = 32768;
+
 int velocity_voxel(const Extent& voxels) {
     const auto blocks = [&](int edge) {
         const auto along = [&](int n) { return std::ceil(double(n) / edge / kBlock); };
@@ -328,6 +330,11 @@ int velocity_voxel(const Extent& voxels) {
     int edge = 1;
     while (blocks(edge) > kMostVelocityBlocks) edge *= 2;
     return edge;
+}
+
+double velocity_bytes(double voxels) {
+    constexpr double kBytesPerVelocity = 13;  // three floats, and the masks and nodes above them
+    return kBytesPerVelocity * std::min(voxels, kMostVelocityBlocks * kBlockVoxels);
 }
 
 void write_vdb(const std::filesystem::path& path, const VdbContent& content, const VdbMetadata& metadata) {

@@ -142,6 +142,7 @@ std::vector<Change> added_behind(std::string_view text, const TextRegion& other,
     return changes;
 }
 
+// Like added_behind().
 Change added_before(std::string_view text, const TextRegion& other, const std::string& item) {
     if (!begins_line(text, other.begin)) return {{other.begin, other.begin}, item + ", "};
     return {{other.begin, other.begin}, item + "," + newline_of(text) + indent_at(text, other.begin)};

@@ -229,9 +229,7 @@ std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& s
         for (const auto& [x, y, z] : level_sizes(s, format))
             floats += 4 * std::uint64_t(x) * std::uint64_t(y) * std::uint64_t(z);
     }
-    // A grid of the wind has three floats a voxel.
-    const std::uint64_t wind =
-        options.velocity_name.empty() ? 0 : 13 * std::min(voxels, std::uint64_t(512 * kMostVelocityBlocks));
+    const auto wind = options.velocity_name.empty() ? 0 : std::uint64_t(velocity_bytes(double(voxels)));
     return std::size_t(
         std::clamp<std::uint64_t>(kMemory / (8 * voxels + floats + codes + wind), 1, threads + 1));
 }

@@ -159,12 +159,12 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
     for (const ExportedFile& file : list.files) {
         if (file.source.empty()) continue;
         ++of_sources;
-        const ListedExport::Sequence* s = sequence_of(list, file.path.generic_string());
-        if (s == nullptr || !is_there(folder / file.source)) {
-            ++lost;
-            continue;
-        }
         try {
+            const ListedExport::Sequence* s = sequence_of(list, file.path.generic_string());
+            if (s == nullptr || !is_there(folder / file.source)) {
+                ++lost;
+                continue;
+            }
             if (file.source_digest && !(file_digest(folder / file.source) == *file.source_digest)) ++changed;
             if (compare_file(folder, list, *s, file, formats[file.format])) ++counts[file.format];
         } catch (const ReadFailure& failure) {  // which says nothing of its content

@@ -195,6 +195,8 @@ def _plan(axes, options):
         if isinstance(values, (str, bytes)):
             raise _error(f"axes[{key!r}] is one text; expected a list of values", "usage")
         is_range = isinstance(values, collections.abc.Mapping)
+        if not is_range and not hasattr(values, "__iter__"):
+            raise _error(f"axes[{key!r}] is a {type(values).__name__}; expected a list of values", "usage")
         values = dict(values) if is_range else list(values)
         if not values and not is_range:
             raise _error(f"axes[{key!r}] has no values; expected one or more, or {{'from': a, 'to': b, 'count': n}}", "usage")

@@ -202,6 +202,13 @@ class Keeping(Case):
                 self.refused(2, "run", scene, "--no-render", "--out", out, *more, says="are one folder")
             after = {str(path): path.stat().st_mtime_ns for path in sorted((self.folder / out).rglob("*"))}
             self.assertEqual(before, after)
+            self.call("run", scene, "--statistics-only", "--out", f"{out}-bits")
+        # To a folder that is not there yet.
+        for link, target, status, says in (("high", "low", 2, "are one folder"), ("low", "high", 3, "a link stands there that leads nowhere")):
+            (self.folder / f"new-{link}/density").mkdir(parents=True)
+            (self.folder / f"new-{link}/density" / link).symlink_to(target)
+            self.refused(status, "run", scene, "--no-render", "--out", f"new-{link}", says=says)
+            self.assertEqual([path for path in (self.folder / f"new-{link}").rglob("*") if path.is_file()], [])
 
     def test_a_frame_that_is_not_what_was_written(self):
         self.call(*self.plain, "--out", "out")

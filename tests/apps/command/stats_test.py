@@ -530,7 +530,8 @@ sd = 20
                 .replace("clouds_every = 0", "clouds_every = 10") + "[[target]]\nstatistic = \"clouds_per_km2\"\n"
                 "from = \"m.png\"\ncell_size_m = 40\nsd = 1\n")
         for key, prior, is_told in (("layer[0].base_height_m", "from = 300, to = 600", True),
-                                    ("layer[0].lattice.cell_size_m", "from = 30, to = 60", False)):
+                                    ("layer[0].lattice.cell_size_m", "from = 30, to = 60", False),
+                                    ("lattice.cell_size_m", "from = 30, to = 60", False)):
             fit = text.replace("field.background.ext", key).replace("from = 0.02, to = 0.3", prior)
             said = self.call("fit", self.write("f.toml", fit), "--out", "f", status=2).stderr
             self.assertIn("9 runs are too few", said)

@@ -532,6 +532,71 @@ class Safety(Case):
             self.assertEqual((editor.returncode, scene.read_text(encoding="utf-8")), (0, text.replace("= 100", "= 150")), leave + said)
             (self.folder / "ready.txt").unlink()
 
+    def test_what_is_recorded_is_of_the_scene_that_another_program_wrote(self):
+        """While a wind or a sun is typed: its key frame joins those of the new text, and the window shows that scene's bits."""
+        scene = self.folder / "w.toml"
+        sun = 'seed = 4\n[lattice]\ncells = [16, 16, 12]\n[sun]\nelevation_deg = 40\npath = [{ time_s = 0, elevation_deg = 10, azimuth_deg = 90 }, { time_s = 200, elevation_deg = 20, azimuth_deg = 90 }]\n'
+        wind = "double-click-at wind[0].levels[0].speed_m_per_s 0.5 0.5\nkey CTRL+A\ntype 12.5\n"
+        start = 'wait 0.3\nkey SPACE\nkey HOME\nwait 0.3\nkey .\nkey .\nwait 0.4\n'
+        for text, new, typed in ((WIND, WIND.replace("[16, 16, 12]", "[24, 20, 14]"), RECORD_WIND + wind),
+                                 (sun, sun.replace("{ time_s = 200", "{ time_s = 70, elevation_deg = 15, azimuth_deg = 95 }, { time_s = 200"),
+                                  f"{start}click sun\nclick \"tab Properties\"\nwait 0.3\ndouble-click-at sun.azimuth_deg 0.5 0.5\nkey CTRL+A\ntype 100\n")):
+            scene.write_text(text, encoding="utf-8")
+            editor = subprocess.Popen(self.command(scene, script=f"{typed}wait 0.3\nhashes ready.txt\nwait 3\nkey ENTER\nwait 0.3\nkey .\nkey .\nwait 0.5\n"
+                                                   "hashes after.txt\nkey CTRL+S\nwait 0.5\n"),
+                                      cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+            self.wait_for(self.folder / "ready.txt", editor)
+            (self.folder / "new").write_text(new, encoding="utf-8")
+            os.replace(self.folder / "new", scene)
+            said = editor.communicate(timeout=120)[1]
+            self.assertEqual(editor.returncode, 0, said)
+            saved = tomllib.loads(scene.read_text(encoding="utf-8"))
+            if text == sun:
+                self.assertEqual([key["elevation_deg"] for key in saved["sun"]["path"] if key["time_s"] in (0, 70, 200)], [10, 15, 20])
+                self.assertEqual([key["azimuth_deg"] for key in saved["sun"]["path"] if key["time_s"] not in (0, 70, 200)], [100])
+                done = subprocess.run([NEPHOS, "validate", scene], capture_output=True, text=True)
+                self.assertEqual(done.returncode, 0, done.stderr + scene.read_text())
+            else:
+                self.assertEqual((saved["lattice"]["cells"], len(saved["wind"]) > 1), ([24, 20, 14], True))
+                shown = (self.folder / "after.txt").read_text().split()
+                hashes = subprocess.run([NEPHOS, "hash", scene, "--steps", "12"], capture_output=True, text=True).stdout
+                self.assertIn(shown[-1], hashes)
+            (self.folder / "ready.txt").unlink()
+
+    def test_a_recorded_sun_may_be_that_of_its_key(self):
+        """The key frames hold, and not the key: setting its value is a change. Setting what is shown is none."""
+        scene = self.folder / "w.toml"
+        text = 'seed = 4\n[lattice]\ncells = [16, 16, 12]\n[sun]\nelevation_deg = 40\npath = [{ time_s = 0, elevation_deg = 10, azimuth_deg = 90 }]\n'
+        for typed, elevations in (("40", [10, 40]), ("10", [10])):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script="wait 0.3\nkey SPACE\nkey HOME\nwait 0.3\nkey .\nkey .\nwait 0.4\nclick sun\nclick \"tab Properties\"\nwait 0.3\n"
+                                    f"set sun.elevation_deg {typed}\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+            saved = tomllib.loads(scene.read_text(encoding="utf-8"))
+            self.assertEqual([key["elevation_deg"] for key in saved["sun"]["path"]], elevations)
+
+    def test_a_click_on_a_handle_changes_nothing(self):
+        """Nor does a drag while the text has a problem, whose scene is that of an earlier one."""
+        scene = self.folder / "h.toml"
+        text = ('seed = 4\n[lattice]\ncells = [32, 32, 24]\ncell_size_m = 100\n[field]\nellipsoids = [{ centre_m = [0.123456, 0.654321, 1200.5], '
+                "semi_axes_m = [333.25, 444.5, 222.125], yaw_deg = 270.25 }]\n")
+        select = "wait-step 1\nclick field\nclick field.ellipsoids\nclick field.ellipsoids[0]\nwait 0.3\nkey F\nwait 0.5\n"
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script=select + "".join(f'click "handle {name}"\nwait 0.2\n' for name in ("move east", "turn", "size x")) + "key CTRL+S\nwait 0.5\n")
+        self.assertEqual(scene.read_text(encoding="utf-8"), text)
+        scene.write_text(text.replace("seed = 4", "seed = -4"), encoding="utf-8")
+        said = self.edit(scene, script=select.replace("wait-step 1", "wait 1") + 'drag "handle move east" 40 0\n', status=1)
+        self.assertIn("no control 'handle move east'", said)
+
+    def test_a_pasted_comma_is_a_point(self):
+        """Also one that is typed right behind Tab."""
+        scene = self.folder / "k.toml"
+        text = 'seed = 4\n[lattice]\ncells = [16, 16, 12]\norigin_m = [0, 0, 0]\n'
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script='wait-step 1\nclick lattice\nclick "tab Properties"\nwait 0.2\nclick find\ntype 12,5\nkey CTRL+A\nkey CTRL+X\nwait 0.3\n'
+                                "double-click-at lattice.origin_m[0] 0.5 0.5\nkey CTRL+A\nkey CTRL+V\nwait 0.2\nkey TAB\ntype 7,25\nwait 0.2\n"
+                                "key ENTER\nkey CTRL+S\nwait 0.5\n")
+        self.assertEqual(scene.read_text(encoding="utf-8"), text.replace("[0, 0, 0]", "[12.5, 7.25, 0]"))
+
     def test_an_end_waits_for_what_is_refused(self):
         """Once, so that it is seen; the second one ends the editor."""
         scene = self.folder / "q.toml"

@@ -154,6 +154,15 @@ TEST(SceneDocument, WhatIsTakenBackHasNotBeen) {
     EXPECT_TRUE(document.take_back("sun"));
     EXPECT_EQ(document.text(), first);
     EXPECT_FALSE(document.can_undo() || document.can_redo() || document.take_back("sun"));
+    document.edit(with_value(document.text(), path, "9"), "another");
+    document.undo();
+    document.edit(with_value(document.text(), path, "3"), "type", "sun");
+    EXPECT_FALSE(document.can_redo());
+    EXPECT_TRUE(document.take_back("sun"));
+    ASSERT_TRUE(document.can_redo());
+    document.redo();
+    EXPECT_EQ(document.text(), "[sun]\nelevation_deg = 9\n");
+    document.undo();
     document.edit(with_value(document.text(), path, "4"), "type", "sun");
     document.end_merging();
     EXPECT_FALSE(document.take_back("sun"));
