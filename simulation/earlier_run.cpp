@@ -2,6 +2,7 @@
 #include "simulation/earlier_run.h"
 
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 #include <map>
 #include <system_error>
@@ -19,6 +20,7 @@
 #include "core/paths.h"
 #include "scenes/format/writer.h"
 #include "simulation/manifest.h"
+#include "simulation/run_listing.h"
 #include "simulation/statistics_file.h"
 
 namespace nephos {
@@ -95,6 +97,54 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     throw Error(ErrorCode::usage,
                 fmt::format("{}: nothing was written, because {}: choose another --out, or give --overwrite",
                             folder.folder.string(), reason));
+}
+
+// Files of a complete run by their paths below its folder.
+std::map<std::string, FileDigest> listed_files(const RunFolder& folder) {
+    const RunListing run = read_run(folder.folder);
+    std::map<std::string, FileDigest> files;
+    const auto add = [&](const std::vector<FileRecord>& records) {
+        for (const FileRecord& record : records) files.emplace(record.path, record.digest);
+    };
+    for (const ListedFrame& frame : run.frames) add(frame.files);
+    add(run.run_files);
+    return files;
+}
+
+// Returns whether a run of frames `range` writes a frame to this path.
+bool is_frame_place(const RunFolder& folder, const Scene& scene, const SimulationRange& range,
+                    const std::filesystem::path& file) {
+    const std::string name = file.filename().string();
+    const std::size_t begin = folder.name.size() + 1;
+    int number = 0;
+    if (!is_frame_of(name, folder.name)) return false;
+    const auto parsed = std::from_chars(name.data() + begin, name.data() + name.size(), number);
+    if (parsed.ec != std::errc() || number < range.first_frame || number > range.last_frame) return false;
+    std::vector<std::filesystem::path> places = density_files(folder, scene, number);
+    for (const char* extension : {".png", ".exr"}) places.push_back(folder.picture(number, extension));
+    return std::ranges::count(places, file) > 0;
+}
+
+// Throws Error(usage) where a frame, a picture or a video of the earlier run's name is none of its files, or not as it wrote it: a
+// copy that the user keeps, or that of another run behind a link. Of a run that is not complete its frames' places tell it.
+void refuse_to_lose_others(const RunFolder& folder, const RunSettings& settings, const EarlierRun& earlier,
+                           const std::vector<std::filesystem::path>& files) {
+    std::map<std::string, FileDigest> listed;
+    if (earlier.complete) listed = listed_files(folder);
+    const bool has_list = earlier.complete && !listed.empty();  // none of earlier versions
+    for (const std::filesystem::path& file : files) {
+        const bool is_video = file == folder.video();
+        if (!is_video && !is_frame_of(file.filename().string(), folder.name))
+            continue;  // others are looked at apart
+        const std::string path = file.lexically_relative(folder.folder).generic_string();
+        const auto found = listed.find(path);
+        const bool is_own = has_list   ? found != listed.end()
+                            : is_video ? wants_video(settings.scene)
+                                       : is_frame_place(folder, settings.scene, earlier.range, file);
+        if (!is_own) refuse(folder, fmt::format("there is {}, which the run in it has not written", path));
+        if (has_list && !(file_digest(file) == found->second))
+            refuse(folder, fmt::format("{} is not what the run in it has written", path));
+    }
 }
 
 // Returns whether a new run of the same scene makes all files of an earlier one again.
@@ -298,6 +348,7 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const 
                                    changed.empty() ? other_content(earlier, settings)
                                                    : "another content of " + changed));
     }
+    refuse_to_lose_others(folder, settings, earlier, files);
     if (earlier.complete && !makes_again(earlier, settings)) {
         refuse(folder, fmt::format("it holds a complete run for {}, not all of which would be made again",
                                    range_text(earlier)));

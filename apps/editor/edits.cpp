@@ -36,7 +36,10 @@ void set_value(Editor& editor, const TextPath& path, const std::string& value, b
         ImGui::IsAnyItemActive() || (editor.recorded_value && editor.recorded_value->path == path);
     if (is_recorded_when_left(editor, path) && is_at_work) {
         const bool goes_on = editor.recorded_value && editor.recorded_value->path == path;
-        const auto before = goes_on ? editor.recorded_value->before : value_now(editor, path);
+        std::optional<std::string> before = goes_on ? editor.recorded_value->before : std::nullopt;
+        if (const auto shown = editor.values_now.find(path_text(path));
+            !goes_on && shown != editor.values_now.end())
+            before = shown->second;
         editor.recorded_value = {path, value, form, before};
         return;
     }

@@ -107,12 +107,6 @@ std::string with_lines(std::string_view text, std::string_view lines, std::strin
     return out.append(text.substr(place_of(text, lines.size() - behind)));
 }
 
-// Returns whether a field of a number has the caret. ImGui leaves the comma out of what is typed there, and 12,5 would be 125.
-bool is_number_field_active() {
-    const ImGuiContext& g = *ImGui::GetCurrentContext();
-    return g.ActiveId != 0 && g.ActiveId == g.TempInputId;
-}
-
 // The field that had the caret last: what it was given, and what it gave back. Of ImGui as a whole, which has one state of fields.
 struct LastField {
     ImGuiID id = 0;
@@ -221,6 +215,11 @@ std::string text_of_field(std::string_view field) {
 
 ImGuiID active_item() { return ImGui::GetActiveID(); }
 
+bool is_number_field_active() {
+    const ImGuiContext& g = *ImGui::GetCurrentContext();
+    return g.ActiveId != 0 && g.ActiveId == g.TempInputId;
+}
+
 void leave_number_field() {
     if (!is_number_field_active()) return;
     ImGuiContext& g = *ImGui::GetCurrentContext();
@@ -324,6 +323,7 @@ void finish_field_first() {
         for (const ImWchar c : held.typed) io.InputQueueCharacters.push_back(c);
         held = {};
     }
+    // ImGui leaves the comma of a number out, and 12,5 would be 125.
     if (is_number_field_active())
         for (ImWchar& c : io.InputQueueCharacters)
             if (c == ',') c = '.';

@@ -54,6 +54,9 @@ void move_caret_on();
 // Returns what has the mouse or the caret; 0 when nothing has.
 ImGuiID active_item();
 
+// Returns whether a field of a number has the caret.
+bool is_number_field_active();
+
 // Takes the caret out of a field of a number, which would give its own copy back once the number is another.
 void leave_number_field();
 

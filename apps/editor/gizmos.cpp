@@ -237,6 +237,7 @@ void scatter_gizmo(Editor& editor, const TextPath& path, const EllipsoidScatter&
 }  // namespace
 
 bool gizmos(Editor& editor) {
+    let_go_of_handles(editor);
     const std::optional<Scene>& now = editor.document->scene();
     // While the text has problems the scene is that of an earlier one, whose elements may stand elsewhere in this one.
     const bool is_of_text = now && editor.document->problems().empty();

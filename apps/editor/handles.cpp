@@ -14,6 +14,7 @@ namespace {
 // Keeps what the mouse holds, and where that has got to.
 struct Grip {
     std::string name;       // empty: nothing
+    TextPath of;            // what is selected
     bool is_moved = false;  // a mere click changes nothing
     double value = 0;
     Vec3 place{};
@@ -25,9 +26,8 @@ bool knob(Editor& editor, const std::string& name, const ImVec2& at, ImU32 colou
     const float radius = 0.42f * ImGui::GetFontSize();
     const ImVec2 mouse = ImGui::GetIO().MousePos;
     const bool near = std::hypot(mouse.x - at.x, mouse.y - at.y) < 1.6f * radius;
-    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) grip.name.clear();
     taken = near && ImGui::IsMouseClicked(ImGuiMouseButton_Left) && grip.name.empty();
-    if (taken) grip = {name, false, 0, {}};
+    if (taken) grip = {name, editor.selected, false, 0, {}};
     const bool mine = grip.name == name;
     constexpr float kFewPixels = 2;
     if (mine && ImGui::IsMouseDragging(ImGuiMouseButton_Left, kFewPixels)) grip.is_moved = true;
@@ -93,6 +93,10 @@ void ellipsoid_lines(const Editor& editor, const Vec3& centre, const Vec3& axes,
 Vec3 turned(const Vec3& v, double yaw_deg) {
     const double angle = yaw_deg * std::numbers::pi / 180, c = std::cos(angle), s = std::sin(angle);
     return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
+}
+
+void let_go_of_handles(const Editor& editor) {
+    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || grip.of != editor.selected) grip.name.clear();
 }
 
 bool holds_handle() { return !grip.name.empty(); }

@@ -25,6 +25,10 @@ void ellipsoid_lines(const Editor& editor, const Vec3& centre, const Vec3& axes,
 // Turns about the vertical, counter-clockwise from above.
 Vec3 turned(const Vec3& v, double yaw_deg);
 
+// To be called before handles are drawn, and also where none are: the mouse has let go of one that went out of sight, or of an
+// element that is not selected any more.
+void let_go_of_handles(const Editor& editor);
+
 // Returns whether the mouse holds a handle.
 bool holds_handle();
 

@@ -132,21 +132,27 @@ std::string with_sun_keys(std::string text, const Scene& scene, const std::vecto
     for (const char* key : {"sun.date", "sun.time", "sun.moves", "sun.latitude_deg", "sun.longitude_deg"})
         text = without(text, text_path(key));
     const TextPath path = text_path("sun.path");
-    std::size_t same = 0;
-    while (same < keys.size() && same < scene.sun_path.size() && keys[same] == scene.sun_path[same]) ++same;
+    const std::vector<SunKey>& before = scene.sun_path;
+    const std::size_t shorter = std::min(keys.size(), before.size());
+    std::size_t same = 0, behind = 0;  // that stay, before the others and behind them
+    while (same < shorter && keys[same] == before[same]) ++same;
+    while (same > 0 && behind < shorter - same &&
+           keys[keys.size() - 1 - behind] == before[before.size() - 1 - behind])
+        ++behind;
     if (same == 0) {
         text = without(text, path);
     } else {
-        for (std::size_t n = scene.sun_path.size(); n-- > same;)
+        for (std::size_t n = before.size() - behind; n-- > same;)
             text = without(text, text_path("sun.path[" + std::to_string(n) + "]"));
     }
-    for (std::size_t n = same; n < keys.size(); ++n) {
+    for (std::size_t n = same; n < keys.size() - behind; ++n) {
         std::vector<TextEntry> entries{{"time_s", number_text(keys[n].time_s)},
                                        {"elevation_deg", number_text(keys[n].elevation_deg)},
                                        {"azimuth_deg", number_text(keys[n].azimuth_deg)}};
         if (keys[n].colour != scene.render.sun.colour)
             entries.emplace_back("colour", colour_toml(keys[n].colour));
-        text = with_new_element(text, path, entries);
+        text =
+            behind > 0 ? with_new_element(text, path, entries, n - 1) : with_new_element(text, path, entries);
     }
     return text;
 }

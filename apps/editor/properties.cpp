@@ -160,7 +160,10 @@ bool plain_rows(Editor& editor, const Section& section, const TextPath& path, co
         const bool present = node != nullptr;
         Node now;  // of a key that key frames stand for
         if (const std::optional<std::string> value = value_now(editor, at)) {
-            now = parsed_value(*value);
+            const bool is_typed = editor.recorded_value && editor.recorded_value->path == at;
+            std::string& shown = editor.values_now[path_text(at)];
+            if (shown.empty() || !is_number_field_active()) shown = *value;
+            now = parsed_value(is_typed ? *value : shown);
             node = &now;
         }
         const ValueRow row{key, at, node != nullptr ? node : default_node(editor, key, at), present};

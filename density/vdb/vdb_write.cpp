@@ -347,9 +347,9 @@ void write_vdb(const std::filesystem::path& path, const VdbContent& content, con
         path, [&](const std::filesystem::path& temporary) { write_file(temporary, path, grids, meta); });
 }
 
-std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int geometry) {
+std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int frame) {
     char number[16];
-    std::snprintf(number, sizeof number, "_%04d.vdb", geometry);
+    std::snprintf(number, sizeof number, "_%04d.vdb", frame);
     return folder / (name + number);
 }
 

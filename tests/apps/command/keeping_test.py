@@ -185,6 +185,53 @@ class Keeping(Case):
         self.assertEqual(len(list((self.folder / "shared").iterdir())), 1)
         self.call("verify", "a")
 
+    def test_what_a_complete_run_has_not_written_is_kept(self):
+        """Copies of frames that the user keeps, those of another run behind a link, and what is called like a frame: without
+        --overwrite the run is not made again. Its own files are."""
+        self.call(*self.plain, "--out", "other", "--seed", "8")
+        def copies(out):
+            (out / "density/old").mkdir()
+            for frame in (out / "density").glob("*.vdb"):
+                shutil.copy(frame, out / "density/old")
+        def linked(out):
+            (out / "density/other").symlink_to("../../other/density")
+        def exchanged(out):
+            shutil.rmtree(out / "density")
+            (out / "density").symlink_to("../other/density")
+        def named(out):
+            (out / "density/tiny_0099.vdb").write_text("mine")
+        def picture(out):
+            (out / "frames").mkdir(exist_ok=True)
+            (out / "frames/tiny_0001.png").write_text("mine")
+        def video(out):
+            (out / "frames").mkdir(exist_ok=True)
+            (out / "frames/tiny.mp4").write_text("mine")
+        for number, (put, says) in enumerate(((copies, "density/old/tiny_0001.vdb, which the run in it has not written"),
+                                              (linked, "density/other/tiny_0001.vdb, which"), (exchanged, "density/tiny_0001.vdb is not what"),
+                                              (named, "density/tiny_0099.vdb, which"), (picture, "frames/tiny_0001.png, which"),
+                                              (video, "frames/tiny.mp4, which"))):
+            out = f"run{number}"
+            self.call(*self.plain, "--out", out)
+            self.call(*self.plain, "--out", out)
+            put(self.folder / out)
+            other = self.files("other")
+            self.kept(out, 2, *self.plain, "--out", out, says=says)
+            self.assertEqual(self.files("other"), other)
+        self.call("run", self.scene, "--statistics-only", "--out", "bits")
+        (self.folder / "bits/density").mkdir()
+        (self.folder / "bits/density/tiny_0001.vdb").write_text("mine")
+        self.kept("bits", 2, "run", self.scene, "--statistics-only", "--out", "bits", says="density/tiny_0001.vdb, which")
+        # One that was killed before its first checkpoint has no list of frames: their places tell them.
+        self.call(*self.plain, "--out", "begun")
+        manifest = self.folder / "begun/manifest.json"
+        manifest.write_text(unsealed({**json.loads(manifest.read_text()), "complete": False}))
+        (self.folder / "begun/checkpoint.nephos").unlink(missing_ok=True)
+        copies(self.folder / "begun")
+        self.kept("begun", 2, *self.plain, "--out", "begun", says="density/old/tiny_0001.vdb, which")
+        shutil.rmtree(self.folder / "begun/density/old")
+        self.call(*self.plain, "--out", "begun")
+        self.call("verify", "begun")
+
     def test_layers_in_one_folder_are_refused(self):
         """By links: the frames of one would replace those of the other. Nothing is written, nothing removed."""
         scene = self.write("layered.toml", LAYERED.replace("enabled = false", "count = 2") + LAYERED[LAYERED.index("[[layer]]"):].replace("low", "high")
@@ -199,7 +246,7 @@ class Keeping(Case):
                 (self.folder / out / "density" / name).symlink_to(target)
             before = {str(path): path.stat().st_mtime_ns for path in sorted((self.folder / out).rglob("*"))}
             for more in ([], ["--overwrite"], ["--seed", "9", "--overwrite"]):
-                self.refused(2, "run", scene, "--no-render", "--out", out, *more, says="are one folder")
+                self.refused(2, "run", scene, "--no-render", "--out", out, *more, says="are one folder" if more else out)
             after = {str(path): path.stat().st_mtime_ns for path in sorted((self.folder / out).rglob("*"))}
             self.assertEqual(before, after)
             self.call("run", scene, "--statistics-only", "--out", f"{out}-bits")

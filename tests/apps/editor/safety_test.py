@@ -574,6 +574,36 @@ class Safety(Case):
             saved = tomllib.loads(scene.read_text(encoding="utf-8"))
             self.assertEqual([key["elevation_deg"] for key in saved["sun"]["path"]], elevations)
 
+    def test_a_handle_that_goes_out_of_sight_is_let_go(self):
+        """Behind the camera, by a quick drag: what is chosen next stays where it is."""
+        scene = self.folder / "h.toml"
+        second = "  { centre_m = [700, 1700, 900], semi_axes_m = [50, 60, 70] }, # second\n"
+        scene.write_text("seed = 4\n[lattice]\ncells = [32, 32, 24]\ncell_size_m = 100\n[camera]\nposition_m = [0, -1500, 2000]\n"
+                         "target_m = [0, 3000, 1200]\n[field]\nellipsoids = [\n  { centre_m = [0, 9000, 1200], semi_axes_m = [3330, 2440, 222] }, # first\n"
+                         f"{second}]\n", encoding="utf-8")
+        self.edit(scene, script="wait-step 1\nkey SPACE\nwait 0.2\nclick field\nclick field.ellipsoids\nclick field.ellipsoids[0]\nwait 0.3\n"
+                                'drag "handle move north" 0 500\nwait 0.5\nclick field.ellipsoids[1]\nwait 0.3\nkey CTRL+S\nwait 0.5\n')
+        saved = scene.read_text(encoding="utf-8")
+        self.assertIn(second, saved)
+        self.assertNotIn("[0, 9000, 1200]", saved)
+
+    def test_looking_into_a_field_of_a_moving_sun_records_nothing(self):
+        """While it moves, and a field of a number has the caret. A key frame that is added leaves the others as they are written."""
+        scene = self.folder / "m.toml"
+        text = ("seed = 4\n[lattice]\ncells = [16, 16, 12]\n[sun]\nelevation_deg = 40\nazimuth_deg = 200\ncolour = [0.9, 0.8, 0.7]\n"
+                "[[sun.path]] # first\ntime_s = 0\nelevation_deg = 4.00e1\nazimuth_deg = 200\ncolour = [0.1, 0.2, 0.3]\n"
+                "[[sun.path]] # late\ntime_s = 90_000 # b\nelevation_deg = 1.00e1 # mine\nazimuth_deg = 300\ncolour = [0.9, 0.8, 0.7]\n# the end\n")
+        for leave in ("key ENTER", "click scene", "key TAB"):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script='wait-step 2\nclick sun\nclick "tab Properties"\nwait 0.3\ndouble-click-at sun.colour[0] 0.5 0.5\nwait 1.5\n'
+                                    f"{leave}\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+            self.assertEqual(scene.read_text(encoding="utf-8"), text, leave)
+        self.edit(scene, script='wait-step 2\nkey SPACE\nclick sun\nclick "tab Properties"\nwait 0.3\nset sun.elevation_deg 33\nwait 0.3\nkey CTRL+S\nwait 0.5\n')
+        saved = scene.read_text(encoding="utf-8")
+        self.assertEqual([key["elevation_deg"] for key in tomllib.loads(saved)["sun"]["path"]], [40, 33, 10])
+        self.assertTrue(saved.startswith(text[:text.index("[[sun.path]] # late")]), saved)
+        self.assertTrue(saved.endswith(text[text.index("[[sun.path]] # late"):]), saved)
+
     def test_a_click_on_a_handle_changes_nothing(self):
         """Nor does a drag while the text has a problem, whose scene is that of an earlier one."""
         scene = self.folder / "h.toml"
