@@ -141,11 +141,13 @@ bool encode(const Simulation& simulation, RunRecorder& recorder, const RunSettin
     return true;
 }
 
-// Makes the folders of density files. Throws Error(usage) where those of layers are one, by links or on a disk for which upper and
+// Makes the folders of density files, where there are several. Throws Error(usage) where those of layers are one, by links or on a disk for which upper and
 // lower case are the same: the frames of one layer would replace those of another.
 void make_density_folders(const RunFolder& folder, const Scene& scene) {
     std::map<FileIdentity, std::filesystem::path> known;
-    for (const std::filesystem::path& file : density_files(folder, scene, 1)) {
+    const std::vector<std::filesystem::path> files = density_files(folder, scene, 1);
+    if (files.size() < 2) return;
+    for (const std::filesystem::path& file : files) {
         const std::filesystem::path each = file.parent_path();
         create_folders(each);
         const std::optional<FileIdentity> identity = identity_behind(each);

@@ -81,7 +81,9 @@ void send_all(int fd, const void* data, std::size_t size) {
         std::vector<int> open(kept.begin(), kept.end());
         open.push_back(fd);
         // A child before this one that was ended has left the position of the files where it was.
-        for (const int file : kept) ::lseek(file, 0, SEEK_SET);
+        for (const int file : kept)
+            if (::lseek(file, 0, SEEK_SET) != 0 && errno != ESPIPE)
+                throw std::runtime_error(std::string(kCannotRead) + std::strerror(errno));
         confine(parent, open, limits.memory_bytes, limits.seconds);
         SandboxWriter writer(fd);
         child(writer);
