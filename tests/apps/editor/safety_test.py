@@ -60,12 +60,66 @@ wait 0.3
 """
 
 
-class Safety(Case):
+class Kept(Case):
+    """What the tests of edits share."""
+
     def models(self):
         path = self.folder / "models.toml"
         path.write_text(MODELS, encoding="utf-8")
         return path
 
+    def type_in_first_line(self, scene, text):
+        """Puts the caret at its end in the Text tab, types, and saves."""
+        typed = f"type {text}" if text else ""
+        self.edit(scene, script=f"""
+            wait 1
+            click tab Text
+            wait 0.3
+            click-at text 0.6 0.02
+            wait 0.5
+            key END
+            {typed}
+            wait 0.5
+            click tab View
+            wait 0.5
+            key CTRL+S
+            wait 0.5
+            """)
+
+    def keep_by_signal(self, scene, script, end=signal.SIGTERM):
+        """What is kept of the edits of such a script when a signal ends the editor."""
+        ready, autosave = self.folder / "ready.txt", scene.parent / f".{scene.name}.autosave"
+        editor = subprocess.Popen(self.command(scene, script=script + "hashes ready.txt\nwait 100\n"), cwd=self.folder,
+                                  env=self.environment, stderr=subprocess.PIPE, text=True)
+        self.wait_for(ready, editor)
+        if end == signal.SIGKILL:
+            self.wait_for(autosave, editor)
+        editor.send_signal(end)
+        editor.communicate(timeout=60)
+        kept = autosave.read_text(encoding="utf-8")
+        autosave.unlink()
+        ready.unlink()
+        return kept
+
+    def wait_for(self, path, program):
+        for _ in range(1200):
+            if path.exists():
+                return
+            self.assertIsNone(program.poll(), "it ended")
+            time.sleep(0.1)
+        program.kill()
+        self.fail(f"no {path} after two minutes")
+
+    def is_our_editor(self, pid, script="script.txt"):
+        try:
+            with open(f"/proc/{pid}/cmdline", "rb") as file:
+                words = file.read().split(b"\0")
+        except OSError:
+            return False
+        return words[0].endswith(b"nephos-editor") and str(self.folder / script).encode() in words
+
+
+class Safety(Kept):
     def test_edits_of_a_text_that_is_no_toml(self):
         """With `=` as the whole text the outline still shows the scene: copying, deleting, adding and renaming what it
         shows are refused with a message, the program goes on, and undo brings the scene back."""
@@ -107,24 +161,6 @@ class Safety(Case):
         saved = tomllib.loads(scene.read_text(encoding="utf-8"))
         self.assertEqual(saved["sun"]["elevation_deg"], 21)
         self.assertEqual(saved["model"], tomllib.loads(MODELS)["model"])
-
-    def type_in_first_line(self, scene, text):
-        """Puts the caret at its end in the Text tab, types, and saves."""
-        typed = f"type {text}" if text else ""
-        self.edit(scene, script=f"""
-            wait 1
-            click tab Text
-            wait 0.3
-            click-at text 0.6 0.02
-            wait 0.5
-            key END
-            {typed}
-            wait 0.5
-            click tab View
-            wait 0.5
-            key CTRL+S
-            wait 0.5
-            """)
 
     def test_any_character_and_any_end_of_a_line(self):
         """Characters beyond U+FFFF and private ones, in the text and in a value, stay what they are; a click changes nothing;
@@ -198,6 +234,347 @@ class Safety(Case):
         _, said = editor.communicate(timeout=120)
         self.assertEqual(editor.returncode, 0, said)
         self.assertEqual(scene.read_text(encoding="utf-8"), other)
+
+    def test_reload_reads_the_files_that_a_scene_names(self):
+        scene = self.folder / "r.toml"
+        scene.write_text(MODELS[:MODELS.index("[[model]]")] + 'models = "m.toml"\n' + MODELS[MODELS.index("[[sky]]"):], encoding="utf-8")
+        self.edit(scene, script="wait 1\nexpect-control problems\n")
+
+        def bring_models():
+            while not (self.folder / "ready.png").exists():
+                time.sleep(0.1)
+            other = self.folder / "other"
+            other.write_text("seed = 1\n" + MODELS[MODELS.index("[[model]]"):MODELS.index("[[sky]]")], encoding="utf-8")
+            other.rename(self.folder / "m.toml")
+
+        threading.Thread(target=bring_models, daemon=True).start()
+        self.edit(scene, script="wait 1\nscreenshot ready.png\nwait 2\nexpect-control problems\nclick \"menu File\"\nclick \"menu Reload\"\n"
+                                "wait-step 1\n")
+
+    def test_a_folder_of_scenes_and_other_things(self):
+        folder = self.folder / "scenes"
+        (folder / "a.toml").mkdir(parents=True)
+        os.symlink("me@host.1:2", folder / ".#sky.toml")
+        (folder / "._sky.toml").write_bytes(b"\0\5\26\7")
+        (folder / "sky.toml").write_text(MODELS, encoding="utf-8")
+        self.edit(folder, script="wait-step 1\nexpect-control model\n")
+
+    def test_a_run_of_a_text_with_problems(self):
+        """It is not that of the scene before, which the window still shows."""
+        scene = self.models()
+        said = self.edit(scene, status=1, script="""
+            wait-step 1
+            click tab Text
+            click text
+            key CTRL+A
+            type q=
+            wait 0.3
+            click tab View
+            key CTRL+R
+            wait 0.5
+            click "Start the run"
+            """)
+        self.assertIn("no control 'Start the run'", said)
+        self.assertFalse((self.folder / "out").exists())
+
+    def test_a_display_that_goes_away_keeps_the_edits(self):
+        scene = self.models()
+        script = self.folder / "script.txt"
+        script.write_text("wait-step 1\nclick sun\nset sun.elevation_deg 21\nwait 0.3\nhashes ready.txt\nwait 100\n", encoding="utf-8")
+        screen = Screen()
+        editor = subprocess.Popen([NEPHOS, "edit", str(scene), "--size", "1280x800", "--script", str(script)], cwd=self.folder,
+                                  env={**self.environment, "DISPLAY": screen.display}, stderr=subprocess.PIPE, text=True)
+        self.wait_for(self.folder / "ready.txt", editor)
+        screen.close()
+        _, said = editor.communicate(timeout=60)
+        self.assertEqual(editor.returncode, 4, said)
+        self.assertIn("the display is gone; unsaved edits are kept", said)
+        self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
+
+    def test_a_picture_of_a_scene_with_problems(self):
+        """The window with what is wrong, and status 2 or 3; a script does not wait for a picture for ever."""
+        for text, status, says in (("[sun]\nelevation_deg = 95\n", 2, "`sun.elevation_deg` is 95, too large"),
+                                   ('[lattice]\ncells = [8, 8, 8]\ncell_size_m = 100\ninitial_state = "none.vdb"\n', 3, "none.vdb: No such file")):
+            scene = self.folder / "p.toml"
+            scene.write_text(text, encoding="utf-8")
+            said = self.edit(scene, "--screenshot", "window.png", "--after", "1", status=status, timeout=120)
+            self.assertIn(says, said)
+            self.assertEqual(self.image("window.png").size, (1280, 800))
+        self.assertIn("script.txt:1: waited too long for a picture", self.edit(scene, script="picture y.png\n", status=1, timeout=180))
+        for line, says in (("random -5 1", "'-5' is no number from 0 to"), ("wait 0.1x", "'0.1x' is no number"), ("resize nan 9", "'nan' is no number"),
+                           ("resize 100 1e30", "'1e30' is no number from 1 to 16384"), ("wait -1", "'-1' is no number")):
+            self.assertIn(f"script.txt:1: {says}", self.edit(scene, script=line + "\n", status=1, timeout=120))
+
+    def test_every_new_element_is_valid(self):
+        """What a `+` of the outline writes needs no hand in the text."""
+        scene = self.folder / "new.toml"
+        scene.write_text("[lattice]\ncells = [12, 10, 8]\n", encoding="utf-8")
+        # Those of files, wind_field and field.grids, want their name.
+        script = "wait 1\nclick field\nwait 0.5\n"
+        for table in ("wind", "wind[0].levels", "lightning", "model", "sky", "field.profile", "field.profile[0].levels", "field.ellipsoids",
+                      "field.scatters", "layer"):
+            script += f'click "new {table}"\nwait 0.7\n'
+        self.edit(scene, script=script + "key CTRL+S\nwait 0.5\n")
+        self.assertIn("levels", tomllib.loads(scene.read_text(encoding="utf-8"))["field"]["profile"][0])
+        done = subprocess.run([NEPHOS, "validate", scene], capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_saving_over_another_file_asks(self):
+        """Save as, onto a file that is there: the first press asks, another name takes the question back, and only
+        Replace it overwrites. The scene's own file is no question."""
+        scene = self.models()
+        other = self.folder / "other.toml"
+        other.write_text("seed = 99\n", encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait-step 1
+            key CTRL+SHIFT+S
+            set "file name" other.toml
+            wait 0.3
+            expect-control "Replace it"
+            set "file name" third.toml
+            wait 0.5
+            key CTRL+SHIFT+S
+            set "file name" other.toml
+            click Cancel
+            wait 0.3
+            """)
+        self.assertEqual(other.read_text(encoding="utf-8"), "seed = 99\n")
+        self.assertEqual((self.folder / "third.toml").read_text(encoding="utf-8"), MODELS)
+        self.edit(scene, script="""
+            wait-step 1
+            key CTRL+SHIFT+S
+            set "file name" other.toml
+            click "Replace it"
+            wait 0.5
+            """)
+        self.assertEqual(other.read_text(encoding="utf-8"), MODELS)
+
+    def test_a_dialog_that_is_cancelled_answers_nothing(self):
+        """Open beside, cancelled: closing asks about unsaved edits as before. Keys do nothing while it asks: a new scene does not
+        take the place of the end."""
+        scene = self.models()
+        self.edit(scene, "--validation", script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            click "open simulation"
+            wait 0.3
+            click Cancel
+            key CTRL+Q
+            wait 0.3
+            expect-control "unsaved models.toml"
+            key CTRL+N
+            wait 0.3
+            expect-control "unsaved models.toml"
+            click "Go on editing"
+            wait 0.3
+            key CTRL+Q
+            wait 0.3
+            key CTRL+N
+            wait 0.3
+            click "Save them"
+            wait 0.5
+            expect-control "is not reached: it has ended"
+            """)
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+
+    def test_closing_asks_about_scenes_that_are_not_shown(self):
+        """A scene with edits and a copy of it, which has them too: each is asked about, the copy although it was never edited
+        itself. What was answered before one goes on is asked again."""
+        scene = self.models()
+        self.edit(scene, "--validation", script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            click "copy simulation"
+            wait-step 1
+            click "new simulation"
+            wait-step 1
+            key CTRL+Q
+            wait 0.3
+            expect-control "unsaved models.toml"
+            click "Discard them"
+            wait 0.3
+            expect-control "unsaved models-2.toml"
+            click "Go on editing"
+            wait 0.3
+            key CTRL+Q
+            wait 0.3
+            expect-control "unsaved models-2.toml"
+            click "Discard them"
+            wait 0.3
+            expect-control "unsaved models.toml"
+            click "Save them"
+            wait 0.5
+            """)
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+        self.assertEqual([path.name for path in self.folder.glob(".*autosave")], [])
+
+    def test_edits_of_a_copy_come_back(self):
+        """A copy that was never saved, of an editor that was killed: offered with its scene, and taken beside it."""
+        scene = self.models()
+        (self.folder / ".models-2.toml.autosave").write_text(MODELS.replace("seed = 4", "seed = 12"), encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            click "Take them"
+            wait-step 1
+            expect-control "simulation 2"
+            key CTRL+S
+            set "file name" copy.toml
+            wait 0.5
+            """)
+        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
+        self.assertIn("seed = 12", (self.folder / "copy.toml").read_text(encoding="utf-8"))
+        self.assertFalse((self.folder / ".models-2.toml.autosave").exists())
+
+    def test_a_picture_that_cannot_be_saved(self):
+        """A picture of the window into a folder that cannot be made: said, and the program goes on."""
+        scene = self.models()
+        self.edit(scene, script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            key F12
+            set "file name" /proc/nowhere/window.png
+            wait 0.5
+            expect-control sun.elevation_deg
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+
+    def test_an_older_autosave_is_not_taken_for_the_newer(self):
+        """Edits of a crashed session beside a file that was written later: the question says so, and they can be kept
+        as a scene of their own."""
+        scene = self.models()
+        autosave = self.folder / ".models.toml.autosave"
+        autosave.write_text("seed = 5\n", encoding="utf-8")
+        os.utime(autosave, (time.time() - 3600,) * 2)
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            expect-control "the file is newer"
+            click "Keep them in a file"
+            wait 0.3
+            click sun
+            set sun.elevation_deg 21
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertFalse(autosave.exists())
+        self.assertEqual((self.folder / "models-recovered.toml").read_text(encoding="utf-8"), "seed = 5\n")
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+
+    def test_two_editors_of_one_scene(self):
+        """The second editor is not asked about the edits of the first, which lives, and does not touch its file; killed, each
+        leaves its edits, and the next editor asks about both."""
+        scene = self.models()
+        programs = []
+        for number in (1, 2):
+            script = self.folder / f"script-{number}.txt"
+            script.write_text(f"wait-step 1\nclick sun\nset sun.elevation_deg {20 + number}\nwait 6\n"
+                              f"hashes ready-{number}.txt\nwait 100\n", encoding="utf-8")
+            programs.append(subprocess.Popen([*self.command(scene), "--script", str(script)], cwd=self.folder,
+                                             env=self.environment, stderr=subprocess.PIPE, text=True))
+            self.wait_for(self.folder / f"ready-{number}.txt", programs[-1])
+        kept = sorted(self.folder.glob(".models.toml.*autosave"))
+        self.assertEqual(len(kept), 2, kept)
+        self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
+        # A picture for the documentation asks nothing and overwrites nothing.
+        before = {path: path.read_bytes() for path in kept}
+        self.edit(scene, "--screenshot", self.folder / "picture.png", "--after", "6", script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 50
+            wait 6
+            """)
+        self.assertEqual({path: path.read_bytes() for path in self.folder.glob(".models.toml.*autosave")}, before)
+        for number, program in enumerate(programs, 1):
+            name = f"script-{number}.txt"
+            (editor,) = [int(pid) for pid in os.listdir("/proc") if pid.isdigit() and self.is_our_editor(pid, name)]
+            os.kill(editor, signal.SIGKILL)
+            program.communicate(timeout=30)
+        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            click "Keep them in a file"
+            wait 0.3
+            click "Take them"
+            wait-step 1
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertIn("elevation_deg = 22", (self.folder / "models-recovered.toml").read_text(encoding="utf-8"))
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+        self.assertEqual(list(self.folder.glob(".models.toml.*autosave")), [])
+
+    def test_edits_that_cannot_be_read_are_a_question(self):
+        """An autosave that is no text of a scene is said to be there, and stays until the user decides."""
+        scene = self.models()
+        autosave = self.folder / ".models.toml.autosave"
+        with autosave.open("wb") as file:
+            file.truncate(64 << 20)
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            expect-control "unreadable edits"
+            click "Ask again next time"
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            wait 6
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertEqual(autosave.stat().st_size, 64 << 20)
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+
+    def test_a_signal_keeps_the_edits(self):
+        """An end of the session: the program ends by SIGTERM within a moment, and unsaved edits are beside the scene."""
+        scene = self.models()
+        scene.chmod(0o600)
+        ready = self.folder / "ready.txt"
+        program = subprocess.Popen(self.command(scene, script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            hashes ready.txt
+            wait 60
+            """), cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+        self.wait_for(ready, program)
+        (editor,) = [int(pid) for pid in os.listdir("/proc") if pid.isdigit() and self.is_our_editor(pid)]
+        os.kill(editor, signal.SIGTERM)
+        program.communicate(timeout=30)
+        self.assertEqual(program.returncode, 128 + signal.SIGTERM)
+        autosave = self.folder / ".models.toml.autosave"
+        self.assertIn("elevation_deg = 21", autosave.read_text(encoding="utf-8"))
+        self.assertEqual(autosave.stat().st_mode & 0o777, 0o600)  # as private as the scene may be
+        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
+
+    def test_a_scene_with_problems_shows_none_of_the_clouds_before(self):
+        """The clouds of one scene are not left under the title of the next, which cannot be simulated."""
+        self.models()
+        bad = self.folder / "other"
+        bad.mkdir()
+        (bad / "a.toml").write_text(MODELS, encoding="utf-8")
+        (bad / "b.toml").write_text("[sun]\nelevation_deg = 95\n", encoding="utf-8")
+        self.edit(bad, script="""
+            wait-step 1
+            key SPACE
+            wait-picture
+            screenshot clouds.png
+            click menu File
+            click "menu Scenes of the folder"
+            click "menu b.toml"
+            wait 1
+            expect-control problems
+            screenshot nothing.png
+            """)
+        box = (320, 80, 850, 550)
+        self.assertGreater(ImageStat.Stat(self.image("clouds.png", box)).stddev[0], 10)
+        self.assertLess(ImageStat.Stat(self.image("nothing.png", box)).stddev[0], 3)
+
+
+class Fields(Kept):
+    """What is typed into fields or dragged, while it is recorded, interrupted, taken back or changed by others."""
 
     def test_what_is_typed_counts_wherever_it_is_left(self):
         """Also by a click on what is drawn before the field, by Ctrl+S, and in a field of numbers; and Ctrl+Z in a field that was left
@@ -356,34 +733,10 @@ class Safety(Case):
             """)
         self.edit(scene, script="wait 1\nclick \"menu File\"\nwait 0.3\nclick \"menu Recent\"\nwait 0.3\n")
 
-    def test_reload_reads_the_files_that_a_scene_names(self):
-        scene = self.folder / "r.toml"
-        scene.write_text(MODELS[:MODELS.index("[[model]]")] + 'models = "m.toml"\n' + MODELS[MODELS.index("[[sky]]"):], encoding="utf-8")
-        self.edit(scene, script="wait 1\nexpect-control problems\n")
-
-        def bring_models():
-            while not (self.folder / "ready.png").exists():
-                time.sleep(0.1)
-            other = self.folder / "other"
-            other.write_text("seed = 1\n" + MODELS[MODELS.index("[[model]]"):MODELS.index("[[sky]]")], encoding="utf-8")
-            other.rename(self.folder / "m.toml")
-
-        threading.Thread(target=bring_models, daemon=True).start()
-        self.edit(scene, script="wait 1\nscreenshot ready.png\nwait 2\nexpect-control problems\nclick \"menu File\"\nclick \"menu Reload\"\n"
-                                "wait-step 1\n")
-
     def test_scripts_without_commands_end(self):
         scene = self.models()
         self.edit(scene, script="# nothing\n", timeout=120)
         self.assertIn("cannot be read", self.edit(scene, "--script", self.folder, status=3, timeout=120))
-
-    def test_a_folder_of_scenes_and_other_things(self):
-        folder = self.folder / "scenes"
-        (folder / "a.toml").mkdir(parents=True)
-        os.symlink("me@host.1:2", folder / ".#sky.toml")
-        (folder / "._sky.toml").write_bytes(b"\0\5\26\7")
-        (folder / "sky.toml").write_text(MODELS, encoding="utf-8")
-        self.edit(folder, script="wait-step 1\nexpect-control model\n")
 
     def test_one_number_of_several_is_changed(self):
         """Its neighbours keep their digits and their form, and what is typed has all of its own."""
@@ -419,38 +772,6 @@ class Safety(Case):
             """)
         self.assertEqual(scene.read_text(encoding="utf-8"), text)
 
-    def test_a_run_of_a_text_with_problems(self):
-        """It is not that of the scene before, which the window still shows."""
-        scene = self.models()
-        said = self.edit(scene, status=1, script="""
-            wait-step 1
-            click tab Text
-            click text
-            key CTRL+A
-            type q=
-            wait 0.3
-            click tab View
-            key CTRL+R
-            wait 0.5
-            click "Start the run"
-            """)
-        self.assertIn("no control 'Start the run'", said)
-        self.assertFalse((self.folder / "out").exists())
-
-    def test_a_display_that_goes_away_keeps_the_edits(self):
-        scene = self.models()
-        script = self.folder / "script.txt"
-        script.write_text("wait-step 1\nclick sun\nset sun.elevation_deg 21\nwait 0.3\nhashes ready.txt\nwait 100\n", encoding="utf-8")
-        screen = Screen()
-        editor = subprocess.Popen([NEPHOS, "edit", str(scene), "--size", "1280x800", "--script", str(script)], cwd=self.folder,
-                                  env={**self.environment, "DISPLAY": screen.display}, stderr=subprocess.PIPE, text=True)
-        self.wait_for(self.folder / "ready.txt", editor)
-        screen.close()
-        _, said = editor.communicate(timeout=60)
-        self.assertEqual(editor.returncode, 4, said)
-        self.assertIn("the display is gone; unsaved edits are kept", said)
-        self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
-
     def test_a_window_that_another_program_destroys_keeps_the_edits(self):
         scene = self.models()
         script = self.folder / "script.txt"
@@ -485,21 +806,6 @@ class Safety(Case):
             for end in (signal.SIGTERM, signal.SIGKILL):
                 script = f"wait-step 1\nclick scene\nwait 0.2\nclick {key}\nkey END\ntype {typed}\nwait 0.3\n"
                 self.assertEqual(self.keep_by_signal(scene, script, end), kept)
-
-    def keep_by_signal(self, scene, script, end=signal.SIGTERM):
-        """What is kept of the edits of such a script when a signal ends the editor."""
-        ready, autosave = self.folder / "ready.txt", scene.parent / f".{scene.name}.autosave"
-        editor = subprocess.Popen(self.command(scene, script=script + "hashes ready.txt\nwait 100\n"), cwd=self.folder,
-                                  env=self.environment, stderr=subprocess.PIPE, text=True)
-        self.wait_for(ready, editor)
-        if end == signal.SIGKILL:
-            self.wait_for(autosave, editor)
-        editor.send_signal(end)
-        editor.communicate(timeout=60)
-        kept = autosave.read_text(encoding="utf-8")
-        autosave.unlink()
-        ready.unlink()
-        return kept
 
     def test_a_recorded_number_that_is_being_typed_is_kept(self):
         """As the key frame that it is about to be; and a name with those that use it."""
@@ -653,158 +959,6 @@ class Safety(Case):
             name = "models" if key == "name" else "bank"
             self.assertEqual(scene.read_text(encoding="utf-8"), MODELS.replace(f'"{name}"', f'"{name}xyz"'), size)
 
-    def test_a_picture_of_a_scene_with_problems(self):
-        """The window with what is wrong, and status 2 or 3; a script does not wait for a picture for ever."""
-        for text, status, says in (("[sun]\nelevation_deg = 95\n", 2, "`sun.elevation_deg` is 95, too large"),
-                                   ('[lattice]\ncells = [8, 8, 8]\ncell_size_m = 100\ninitial_state = "none.vdb"\n', 3, "none.vdb: No such file")):
-            scene = self.folder / "p.toml"
-            scene.write_text(text, encoding="utf-8")
-            said = self.edit(scene, "--screenshot", "window.png", "--after", "1", status=status, timeout=120)
-            self.assertIn(says, said)
-            self.assertEqual(self.image("window.png").size, (1280, 800))
-        self.assertIn("script.txt:1: waited too long for a picture", self.edit(scene, script="picture y.png\n", status=1, timeout=180))
-        for line, says in (("random -5 1", "'-5' is no number from 0 to"), ("wait 0.1x", "'0.1x' is no number"), ("resize nan 9", "'nan' is no number"),
-                           ("resize 100 1e30", "'1e30' is no number from 1 to 16384"), ("wait -1", "'-1' is no number")):
-            self.assertIn(f"script.txt:1: {says}", self.edit(scene, script=line + "\n", status=1, timeout=120))
-
-    def test_every_new_element_is_valid(self):
-        """What a `+` of the outline writes needs no hand in the text."""
-        scene = self.folder / "new.toml"
-        scene.write_text("[lattice]\ncells = [12, 10, 8]\n", encoding="utf-8")
-        # Those of files, wind_field and field.grids, want their name.
-        script = "wait 1\nclick field\nwait 0.5\n"
-        for table in ("wind", "wind[0].levels", "lightning", "model", "sky", "field.profile", "field.profile[0].levels", "field.ellipsoids",
-                      "field.scatters", "layer"):
-            script += f'click "new {table}"\nwait 0.7\n'
-        self.edit(scene, script=script + "key CTRL+S\nwait 0.5\n")
-        self.assertIn("levels", tomllib.loads(scene.read_text(encoding="utf-8"))["field"]["profile"][0])
-        done = subprocess.run([NEPHOS, "validate", scene], capture_output=True, text=True, check=False)
-        self.assertEqual(done.returncode, 0, done.stderr)
-
-    def test_saving_over_another_file_asks(self):
-        """Save as, onto a file that is there: the first press asks, another name takes the question back, and only
-        Replace it overwrites. The scene's own file is no question."""
-        scene = self.models()
-        other = self.folder / "other.toml"
-        other.write_text("seed = 99\n", encoding="utf-8")
-        self.edit(scene, "--validation", script="""
-            wait-step 1
-            key CTRL+SHIFT+S
-            set "file name" other.toml
-            wait 0.3
-            expect-control "Replace it"
-            set "file name" third.toml
-            wait 0.5
-            key CTRL+SHIFT+S
-            set "file name" other.toml
-            click Cancel
-            wait 0.3
-            """)
-        self.assertEqual(other.read_text(encoding="utf-8"), "seed = 99\n")
-        self.assertEqual((self.folder / "third.toml").read_text(encoding="utf-8"), MODELS)
-        self.edit(scene, script="""
-            wait-step 1
-            key CTRL+SHIFT+S
-            set "file name" other.toml
-            click "Replace it"
-            wait 0.5
-            """)
-        self.assertEqual(other.read_text(encoding="utf-8"), MODELS)
-
-    def test_a_dialog_that_is_cancelled_answers_nothing(self):
-        """Open beside, cancelled: closing asks about unsaved edits as before. Keys do nothing while it asks: a new scene does not
-        take the place of the end."""
-        scene = self.models()
-        self.edit(scene, "--validation", script="""
-            wait-step 1
-            click sun
-            set sun.elevation_deg 21
-            click "open simulation"
-            wait 0.3
-            click Cancel
-            key CTRL+Q
-            wait 0.3
-            expect-control "unsaved models.toml"
-            key CTRL+N
-            wait 0.3
-            expect-control "unsaved models.toml"
-            click "Go on editing"
-            wait 0.3
-            key CTRL+Q
-            wait 0.3
-            key CTRL+N
-            wait 0.3
-            click "Save them"
-            wait 0.5
-            expect-control "is not reached: it has ended"
-            """)
-        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
-
-    def test_closing_asks_about_scenes_that_are_not_shown(self):
-        """A scene with edits and a copy of it, which has them too: each is asked about, the copy although it was never edited
-        itself. What was answered before one goes on is asked again."""
-        scene = self.models()
-        self.edit(scene, "--validation", script="""
-            wait-step 1
-            click sun
-            set sun.elevation_deg 21
-            click "copy simulation"
-            wait-step 1
-            click "new simulation"
-            wait-step 1
-            key CTRL+Q
-            wait 0.3
-            expect-control "unsaved models.toml"
-            click "Discard them"
-            wait 0.3
-            expect-control "unsaved models-2.toml"
-            click "Go on editing"
-            wait 0.3
-            key CTRL+Q
-            wait 0.3
-            expect-control "unsaved models-2.toml"
-            click "Discard them"
-            wait 0.3
-            expect-control "unsaved models.toml"
-            click "Save them"
-            wait 0.5
-            """)
-        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
-        self.assertEqual([path.name for path in self.folder.glob(".*autosave")], [])
-
-    def test_edits_of_a_copy_come_back(self):
-        """A copy that was never saved, of an editor that was killed: offered with its scene, and taken beside it."""
-        scene = self.models()
-        (self.folder / ".models-2.toml.autosave").write_text(MODELS.replace("seed = 4", "seed = 12"), encoding="utf-8")
-        self.edit(scene, "--validation", script="""
-            wait 0.5
-            click "Take them"
-            wait-step 1
-            expect-control "simulation 2"
-            key CTRL+S
-            set "file name" copy.toml
-            wait 0.5
-            """)
-        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
-        self.assertIn("seed = 12", (self.folder / "copy.toml").read_text(encoding="utf-8"))
-        self.assertFalse((self.folder / ".models-2.toml.autosave").exists())
-
-    def test_a_picture_that_cannot_be_saved(self):
-        """A picture of the window into a folder that cannot be made: said, and the program goes on."""
-        scene = self.models()
-        self.edit(scene, script="""
-            wait-step 1
-            click sun
-            set sun.elevation_deg 21
-            key F12
-            set "file name" /proc/nowhere/window.png
-            wait 0.5
-            expect-control sun.elevation_deg
-            key CTRL+S
-            wait 0.5
-            """)
-        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
-
     def test_a_file_that_another_program_changed(self):
         """Saving over what another program wrote meanwhile asks first; going back leaves the file as it is."""
         scene = self.models()
@@ -834,152 +988,6 @@ class Safety(Case):
             errors = program.communicate(timeout=120)[1]
             self.assertEqual(program.returncode, 0, errors)
             self.assertIn(expected, scene.read_text(encoding="utf-8"))
-
-    def wait_for(self, path, program):
-        for _ in range(1200):
-            if path.exists():
-                return
-            self.assertIsNone(program.poll(), "it ended")
-            time.sleep(0.1)
-        program.kill()
-        self.fail(f"no {path} after two minutes")
-
-    def test_an_older_autosave_is_not_taken_for_the_newer(self):
-        """Edits of a crashed session beside a file that was written later: the question says so, and they can be kept
-        as a scene of their own."""
-        scene = self.models()
-        autosave = self.folder / ".models.toml.autosave"
-        autosave.write_text("seed = 5\n", encoding="utf-8")
-        os.utime(autosave, (time.time() - 3600,) * 2)
-        self.edit(scene, "--validation", script="""
-            wait 0.5
-            expect-control "the file is newer"
-            click "Keep them in a file"
-            wait 0.3
-            click sun
-            set sun.elevation_deg 21
-            key CTRL+S
-            wait 0.5
-            """)
-        self.assertFalse(autosave.exists())
-        self.assertEqual((self.folder / "models-recovered.toml").read_text(encoding="utf-8"), "seed = 5\n")
-        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
-
-    def test_two_editors_of_one_scene(self):
-        """The second editor is not asked about the edits of the first, which lives, and does not touch its file; killed, each
-        leaves its edits, and the next editor asks about both."""
-        scene = self.models()
-        programs = []
-        for number in (1, 2):
-            script = self.folder / f"script-{number}.txt"
-            script.write_text(f"wait-step 1\nclick sun\nset sun.elevation_deg {20 + number}\nwait 6\n"
-                              f"hashes ready-{number}.txt\nwait 100\n", encoding="utf-8")
-            programs.append(subprocess.Popen([*self.command(scene), "--script", str(script)], cwd=self.folder,
-                                             env=self.environment, stderr=subprocess.PIPE, text=True))
-            self.wait_for(self.folder / f"ready-{number}.txt", programs[-1])
-        kept = sorted(self.folder.glob(".models.toml.*autosave"))
-        self.assertEqual(len(kept), 2, kept)
-        self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
-        # A picture for the documentation asks nothing and overwrites nothing.
-        before = {path: path.read_bytes() for path in kept}
-        self.edit(scene, "--screenshot", self.folder / "picture.png", "--after", "6", script="""
-            wait-step 1
-            click sun
-            set sun.elevation_deg 50
-            wait 6
-            """)
-        self.assertEqual({path: path.read_bytes() for path in self.folder.glob(".models.toml.*autosave")}, before)
-        for number, program in enumerate(programs, 1):
-            name = f"script-{number}.txt"
-            (editor,) = [int(pid) for pid in os.listdir("/proc") if pid.isdigit() and self.is_our_editor(pid, name)]
-            os.kill(editor, signal.SIGKILL)
-            program.communicate(timeout=30)
-        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
-        self.edit(scene, "--validation", script="""
-            wait 0.5
-            click "Keep them in a file"
-            wait 0.3
-            click "Take them"
-            wait-step 1
-            key CTRL+S
-            wait 0.5
-            """)
-        self.assertIn("elevation_deg = 22", (self.folder / "models-recovered.toml").read_text(encoding="utf-8"))
-        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
-        self.assertEqual(list(self.folder.glob(".models.toml.*autosave")), [])
-
-    def test_edits_that_cannot_be_read_are_a_question(self):
-        """An autosave that is no text of a scene is said to be there, and stays until the user decides."""
-        scene = self.models()
-        autosave = self.folder / ".models.toml.autosave"
-        with autosave.open("wb") as file:
-            file.truncate(64 << 20)
-        self.edit(scene, "--validation", script="""
-            wait 0.5
-            expect-control "unreadable edits"
-            click "Ask again next time"
-            wait-step 1
-            click sun
-            set sun.elevation_deg 21
-            wait 6
-            key CTRL+S
-            wait 0.5
-            """)
-        self.assertEqual(autosave.stat().st_size, 64 << 20)
-        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
-
-    def test_a_signal_keeps_the_edits(self):
-        """An end of the session: the program ends by SIGTERM within a moment, and unsaved edits are beside the scene."""
-        scene = self.models()
-        scene.chmod(0o600)
-        ready = self.folder / "ready.txt"
-        program = subprocess.Popen(self.command(scene, script="""
-            wait-step 1
-            click sun
-            set sun.elevation_deg 21
-            hashes ready.txt
-            wait 60
-            """), cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
-        self.wait_for(ready, program)
-        (editor,) = [int(pid) for pid in os.listdir("/proc") if pid.isdigit() and self.is_our_editor(pid)]
-        os.kill(editor, signal.SIGTERM)
-        program.communicate(timeout=30)
-        self.assertEqual(program.returncode, 128 + signal.SIGTERM)
-        autosave = self.folder / ".models.toml.autosave"
-        self.assertIn("elevation_deg = 21", autosave.read_text(encoding="utf-8"))
-        self.assertEqual(autosave.stat().st_mode & 0o777, 0o600)  # as private as the scene may be
-        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
-
-    def is_our_editor(self, pid, script="script.txt"):
-        try:
-            with open(f"/proc/{pid}/cmdline", "rb") as file:
-                words = file.read().split(b"\0")
-        except OSError:
-            return False
-        return words[0].endswith(b"nephos-editor") and str(self.folder / script).encode() in words
-
-    def test_a_scene_with_problems_shows_none_of_the_clouds_before(self):
-        """The clouds of one scene are not left under the title of the next, which cannot be simulated."""
-        self.models()
-        bad = self.folder / "other"
-        bad.mkdir()
-        (bad / "a.toml").write_text(MODELS, encoding="utf-8")
-        (bad / "b.toml").write_text("[sun]\nelevation_deg = 95\n", encoding="utf-8")
-        self.edit(bad, script="""
-            wait-step 1
-            key SPACE
-            wait-picture
-            screenshot clouds.png
-            click menu File
-            click "menu Scenes of the folder"
-            click "menu b.toml"
-            wait 1
-            expect-control problems
-            screenshot nothing.png
-            """)
-        box = (320, 80, 850, 550)
-        self.assertGreater(ImageStat.Stat(self.image("clouds.png", box)).stddev[0], 10)
-        self.assertLess(ImageStat.Stat(self.image("nothing.png", box)).stddev[0], 3)
 
 
 class Models(Case):
