@@ -36,11 +36,13 @@ void set_value(Editor& editor, const TextPath& path, const std::string& value, b
         ImGui::IsAnyItemActive() || (editor.recorded_value && editor.recorded_value->path == path);
     if (is_recorded_when_left(editor, path) && is_at_work) {
         const bool goes_on = editor.recorded_value && editor.recorded_value->path == path;
-        std::optional<std::string> before = goes_on ? editor.recorded_value->before : std::nullopt;
-        if (const auto shown = editor.values_now.find(path_text(path));
-            !goes_on && shown != editor.values_now.end())
-            before = shown->second;
-        editor.recorded_value = {path, value, form, before};
+        if (goes_on) {
+            editor.recorded_value->value = value;
+        } else {
+            std::optional<std::string> before;
+            if (value_now(editor, path)) before = editor.values_now[path_text(path)];
+            editor.recorded_value = {path, value, form, before};
+        }
         return;
     }
     set_values(editor, TextPath(path.begin(), path.end() - 1), {{path.back().name, value}}, dragging, form);

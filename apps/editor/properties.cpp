@@ -150,6 +150,13 @@ TextPath joined_path(const TextPath& path, const std::string& name) {
     return out;
 }
 
+// Returns what the field of a key shows that key frames stand for: `value`, but while a number has the caret what it was before.
+const std::string& standing_value(Editor& editor, const TextPath& path, const std::string& value) {
+    std::string& shown = editor.values_now[path_text(path)];
+    if (shown.empty() || !is_number_field_active()) shown = value;
+    return shown;
+}
+
 // Rows of the plain keys of a section; returns whether there were any.
 bool plain_rows(Editor& editor, const Section& section, const TextPath& path, const std::string& filter) {
     bool any = false, open = false;
@@ -161,9 +168,7 @@ bool plain_rows(Editor& editor, const Section& section, const TextPath& path, co
         Node now;  // of a key that key frames stand for
         if (const std::optional<std::string> value = value_now(editor, at)) {
             const bool is_typed = editor.recorded_value && editor.recorded_value->path == at;
-            std::string& shown = editor.values_now[path_text(at)];
-            if (shown.empty() || !is_number_field_active()) shown = *value;
-            now = parsed_value(is_typed ? *value : shown);
+            now = parsed_value(is_typed ? *value : standing_value(editor, at, *value));
             node = &now;
         }
         const ValueRow row{key, at, node != nullptr ? node : default_node(editor, key, at), present};

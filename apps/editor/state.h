@@ -219,10 +219,10 @@ struct Editor : OpenScene {
         std::optional<std::string> before;  // of one that key frames stand for
     };
     std::optional<RecordedValue> recorded_value;
-    // What the fields of keys show that key frames stand for, by their paths. It stands still while a number has the caret, whose
-    // field would give what it began with back as a change.
+    // Keeps what fields show of keys that key frames stand for, by their paths. It stands still while a number has the caret,
+    // whose field would give what it began with back as a change.
     std::map<std::string, std::string> values_now;
-    // What had the mouse or the caret in the frame before: its edits are one step of undo.
+    // Names what had the mouse or the caret in the frame before: its edits are one step of undo.
     ImGuiID merged_item = 0;
     std::chrono::steady_clock::time_point message_time, last_disk_look, last_autosave;
     std::string rates;  // in the status bar, from time to time: one that changes in every frame cannot be read

@@ -228,7 +228,7 @@ TEST(VdbWrite, TheWindOfALargeBoxHasLargerVoxels) {
               openvdb::Vec3s(0.5f * 9.5f + 100 + 7.5f * 200, -7 + 200 + 9.5f * 200, 300 + 2.5f * 200));
 }
 
-// Where it is the same in a whole block it takes no room; what reads it finds it all the same.
+// A block of one velocity is a tile; what reads the grid finds it all the same.
 TEST(VdbWrite, UniformWindTakesNoRoom) {
     const test::TemporaryFolder folder;
     const Extent extent{100, 64, 24};
