@@ -303,6 +303,21 @@ void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput
     }
 }
 
+void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& settings) {
+    const EarlierRun earlier = read_manifest(folder.manifest());
+    if (!earlier.complete) return;
+    const SimulationRange next{.last_step = settings.range.last_step,
+                               .first_frame = earlier.range.last_frame + 1,
+                               .last_frame = settings.range.last_frame};
+    for (const std::filesystem::path& file : earlier_files(folder)) {
+        if (!is_frame_place(folder, settings.scene, next, file)) continue;
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: would be replaced by the next frame of the run, which has not written it: "
+                                "move it away, or start anew with --overwrite",
+                                file.string()));
+    }
+}
+
 void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
                     Resumption found) {
     for (const LayerOptions& layer : settings.scene.layers) {

@@ -43,6 +43,10 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const 
 // is in the folder.
 void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs);
 
+// Throws Error(usage) when a complete run that is lengthened would replace a file that is called like one of its next frames.
+// After an interruption such files may be its own: they are made again.
+void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& settings);
+
 // Throws Error(usage) when the folder holds a run of another scene, Error(io) when its manifest cannot be read.
 Resumption find_resumption(const RunSettings& settings, const RunFolder& folder);
 

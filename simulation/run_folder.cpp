@@ -141,8 +141,9 @@ bool encode(const Simulation& simulation, RunRecorder& recorder, const RunSettin
     return true;
 }
 
-// Makes the folders of density files, where there are several. Throws Error(usage) where those of layers are one, by links or on a disk for which upper and
-// lower case are the same: the frames of one layer would replace those of another.
+// Makes the folders of density files, where there are several. Throws Error(usage) where those of layers are
+// one, by links or on a disk for which upper and lower case are the same: the frames of one layer would
+// replace those of another.
 void make_density_folders(const RunFolder& folder, const Scene& scene) {
     std::map<FileIdentity, std::filesystem::path> known;
     const std::vector<std::filesystem::path> files = density_files(folder, scene, 1);
@@ -252,6 +253,8 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     if (!settings.resume) {
         refuse_to_remove_inputs(folder, inputs);
         if (!settings.overwrite) refuse_to_lose(folder, settings, inputs, resumption);
+    } else {
+        refuse_to_replace_next_frames(folder, settings);
     }
     if (settings.range.last_frame >= settings.range.first_frame) make_density_folders(folder, settings.scene);
     if (lock->held()) remove_leftovers(folder);

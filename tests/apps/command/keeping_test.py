@@ -232,6 +232,19 @@ class Keeping(Case):
         self.call(*self.plain, "--out", "begun")
         self.call("verify", "begun")
 
+    def test_a_file_called_like_the_next_frame(self):
+        self.call(*self.plain, "--set", "time.steps=4", "--out", "run")
+        frames = sorted((self.folder / "run/density").iterdir())
+        copy = self.folder / f"run/density/tiny_{len(frames) + 1:04}.vdb"
+        shutil.copy(frames[0], copy)
+        longer = (*self.plain, "--set", "time.steps=9", "--resume", "--out", "run")
+        self.kept("run", 2, *longer, says=f"run/density/{copy.name}: would be replaced by the next frame")
+        self.call("run", self.scene, "--no-render", "--set", "time.steps=4", "--resume", "--out", "run")
+        copy.unlink()
+        self.call(*longer)
+        self.call(*self.plain, "--set", "time.steps=9", "--out", "whole")
+        self.same_runs("run", "whole")
+
     def test_layers_in_one_folder_are_refused(self):
         """By links: the frames of one would replace those of the other. Nothing is written, nothing removed."""
         scene = self.write("layered.toml", LAYERED.replace("enabled = false", "count = 2") + LAYERED[LAYERED.index("[[layer]]"):].replace("low", "high")
