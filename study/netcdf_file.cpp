@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 
+#include "study/netcdf_values.h"
 #include <fmt/format.h>
 
 #include "core/atomic_file.h"
@@ -46,10 +47,6 @@ void put_attributes(std::string& out, const NetcdfAttributes& attributes) {
         put(out, std::uint32_t(NetcdfType::text));
         put_name(out, value);  // its length, its characters, padding
     }
-}
-
-std::uint64_t size_of(NetcdfType type) {
-    return type == NetcdfType::text ? 1 : type == NetcdfType::float64 ? 8 : 4;
 }
 
 std::uint64_t value_count(const NetcdfVariable& variable, const std::vector<NetcdfDimension>& dimensions) {
@@ -103,6 +100,8 @@ void put_value(std::string& out, NetcdfType type, double value) {
         case NetcdfType::float64:
             put(out, value);
             break;
+        default:
+            throw Error(ErrorCode::usage, fmt::format("NetCDF type {}: is read alone", std::uint32_t(type)));
     }
 }
 

@@ -17,7 +17,20 @@
 
 namespace nephos {
 
-enum class NetcdfType { text = 2, int32 = 4, float32 = 5, float64 = 6 };
+// Types of values by the numbers that files have for them; write_netcdf() takes text, int32, float32 and float64.
+enum class NetcdfType : std::uint32_t {
+    int8 = 1,
+    text = 2,
+    int16 = 3,
+    int32 = 4,
+    float32 = 5,
+    float64 = 6,
+    uint8 = 7,
+    uint16 = 8,
+    uint32 = 9,
+    int64 = 10,
+    uint64 = 11,
+};
 
 struct NetcdfDimension {
     std::string name;

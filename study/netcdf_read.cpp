@@ -3,15 +3,13 @@
 // The reader of NetCDF classic files.
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
 #include <cstring>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string_view>
 
 #include "study/netcdf_file.h"
+#include "study/netcdf_values.h"
 #include <fmt/format.h>
 
 #include "core/descriptor.h"
@@ -22,11 +20,6 @@
 namespace nephos {
 namespace {
 
-// Types of values that are asked for by name.
-constexpr std::uint32_t kCharacters = 2, kFloats = 5, kDoubles = 6;
-
-// Values of an attribute: in memory they take up to 8 bytes for each of the file.
-constexpr std::uint64_t kMostOfAttribute = 10'000;
 constexpr std::uint64_t kMostDimensions = 1024;  // of a variable, as of libnetcdf
 constexpr std::size_t kMostListed = 20;          // names of variables in a message
 
@@ -87,47 +80,39 @@ class Reader {
     std::uint64_t at_ = 0;
 };
 
-std::uint64_t size_of_type(std::uint32_t type, const std::filesystem::path& path) {
-    constexpr std::uint64_t kSizes[] = {0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};
-    if (type < 1 || type > 11)
+NetcdfType next_type(Reader& reader, const std::filesystem::path& path) {
+    const auto type = NetcdfType(reader.next<std::uint32_t>());
+    if (!is_known(type))
         throw Error(ErrorCode::io, path.string() + ": has a type of values that is not known");
-    return kSizes[type];
+    return type;
 }
 
-double value_at(const Reader& reader, std::uint64_t at, std::uint32_t type) {
+double value_at(const Reader& reader, std::uint64_t at, NetcdfType type) {
     switch (type) {
-        case 1:
+        case NetcdfType::int8:
             return reader.get<std::int8_t>(at);
-        case 2:
-        case 7:
+        case NetcdfType::text:
+        case NetcdfType::uint8:
             return reader.get<std::uint8_t>(at);
-        case 3:
+        case NetcdfType::int16:
             return reader.get<std::int16_t>(at);
-        case 4:
+        case NetcdfType::int32:
             return reader.get<std::int32_t>(at);
-        case 5:
+        case NetcdfType::float32:
             return double(reader.get<float>(at));
-        case 6:
+        case NetcdfType::float64:
             return reader.get<double>(at);
-        case 8:
+        case NetcdfType::uint16:
             return reader.get<std::uint16_t>(at);
-        case 9:
+        case NetcdfType::uint32:
             return reader.get<std::uint32_t>(at);
-        case 10:
+        case NetcdfType::int64:
             return double(reader.get<std::int64_t>(at));
-        default:
-            return double(reader.get<std::uint64_t>(at));
+        case NetcdfType::uint64:
+            break;
     }
+    return double(reader.get<std::uint64_t>(at));
 }
-
-// The values of an attribute as numbers, or its text: the first kMostOfAttribute.
-struct Attribute {
-    std::uint32_t type = 0;
-    std::vector<double> values;
-    std::string text;
-    std::uint64_t count = 0;  // of all
-};
-using Attributes = std::map<std::string, Attribute>;
 
 // Calls `read` with the name, the type and the number of values of each attribute of a list, and with their first byte.
 template <class Read>
@@ -135,8 +120,8 @@ void for_each_attribute(Reader& reader, const std::filesystem::path& path, const
     reader.next<std::uint32_t>();
     for (std::uint64_t left = reader.count(); left > 0; --left) {
         const std::string name = reader.name();
-        const auto type = reader.next<std::uint32_t>();
-        const std::uint64_t count = reader.count(), bytes = size_of_type(type, path);
+        const NetcdfType type = next_type(reader, path);
+        const std::uint64_t count = reader.count(), bytes = size_of(type);
         if (count > reader.size()) throw Error(ErrorCode::io, path.string() + ": ends early");
         const std::uint64_t begin = reader.at();
         reader.skip(count * bytes);
@@ -149,20 +134,21 @@ void skip_attributes(Reader& reader, const std::filesystem::path& path) {
 }
 
 // The attributes that are asked for, of the list at a place of the file.
-Attributes attributes_at(Reader& reader, std::uint64_t at, const std::filesystem::path& path) {
+std::map<std::string, NetcdfAttribute> attributes_at(Reader& reader, std::uint64_t at,
+                                                     const std::filesystem::path& path) {
     constexpr std::string_view kNames[] = {"_FillValue", "_Unsigned",     "missing_value", "valid_min",
                                            "valid_max",  "valid_range",   "scale_factor",  "add_offset",
                                            "axis",       "standard_name", "units",         "positive"};
-    Attributes attributes;
+    std::map<std::string, NetcdfAttribute> attributes;
     reader.go_to(at);
     for_each_attribute(
         reader, path,
-        [&](const std::string& name, std::uint32_t type, std::uint64_t count, std::uint64_t begin) {
+        [&](const std::string& name, NetcdfType type, std::uint64_t count, std::uint64_t begin) {
             if (std::ranges::count(kNames, name) == 0) return;
-            Attribute attribute{type, {}, {}, count};
-            const std::uint64_t bytes = size_of_type(type, path);
+            NetcdfAttribute attribute{type, {}, {}, count};
+            const std::uint64_t bytes = size_of(type);
             for (std::uint64_t n = 0; n < std::min(count, kMostOfAttribute); ++n) {
-                if (type == kCharacters)
+                if (type == NetcdfType::text)
                     attribute.text.push_back(char(reader.get<std::uint8_t>(begin + n)));
                 else
                     attribute.values.push_back(value_at(reader, begin + n * bytes, type));
@@ -172,181 +158,10 @@ Attributes attributes_at(Reader& reader, std::uint64_t at, const std::filesystem
     return attributes;
 }
 
-// The type of the same bits without a sign; of others the type itself.
-std::uint32_t unsigned_type(std::uint32_t type) {
-    switch (type) {
-        case 1:
-            return 7;
-        case 3:
-            return 8;
-        case 4:
-            return 9;
-        case 10:
-            return 11;
-        default:
-            return type;
-    }
-}
-
-// The number of the bits of a whole number, read without its sign.
-double without_sign(double value, std::uint32_t type) {
-    const double bits = type == 1 ? 8 : type == 3 ? 16 : type == 4 ? 32 : 64;
-    return value < 0 ? value + std::exp2(bits) : value;
-}
-
-struct FoundVariable {
-    std::string name;
+// A variable as the head of the file has it; its attributes are read of those that are asked for alone.
+struct FoundVariable : PackedVariable {
     std::vector<std::uint64_t> dimensions;
-    std::uint32_t type = 0;
-    std::uint64_t begin = 0;
-    std::uint64_t attributes_at = 0;  // byte of the file
-    Attributes attributes;            // of the one that is read
-};
-
-// The value that libnetcdf puts where nothing was written; types of one byte have none.
-std::optional<double> default_fill(std::uint32_t type) {
-    switch (type) {
-        case 3:
-            return -32767;
-        case 4:
-            return -2147483647;
-        case kFloats:
-        case kDoubles:
-            return 9.9692099683868690e+36;
-        case 8:
-            return 65535;
-        case 9:
-            return 4294967295;
-        case 10:
-            return -9223372036854775806.0;
-        case 11:
-            return 18446744073709551614.0;
-        default:
-            return {};
-    }
-}
-
-// NetCDF classic has no unsigned types but in CDF-5: the attribute _Unsigned says that a variable is meant so, and with it those
-// of its attributes of the same type that are values of it (NetCDF Users Guide, "Attribute Conventions").
-void take_as_unsigned(FoundVariable& variable) {
-    const auto found = variable.attributes.find("_Unsigned");
-    if (found == variable.attributes.end()) return;
-    std::string text = found->second.text;
-    while (!text.empty() && text.back() == '\0') text.pop_back();
-    std::ranges::transform(text, text.begin(),
-                           [](char c) { return char(std::tolower(static_cast<unsigned char>(c))); });
-    const std::uint32_t type = variable.type;
-    if (text != "true" || unsigned_type(type) == type) return;
-    variable.type = unsigned_type(type);
-    if (variable.attributes.find("_FillValue") == variable.attributes.end())
-        if (const std::optional<double> usual = default_fill(type))
-            variable.attributes["_FillValue"] = {type, {*usual}, {}, 1};
-    // Those that hold packed values; what packs them, scale_factor and add_offset, has a sign of its own.
-    for (const char* name : {"_FillValue", "missing_value", "valid_min", "valid_max", "valid_range"}) {
-        const auto at = variable.attributes.find(name);
-        if (at == variable.attributes.end() || at->second.type != type) continue;
-        Attribute& attribute = at->second;
-        attribute.type = variable.type;
-        for (double& value : attribute.values) value = without_sign(value, type);
-    }
-}
-
-// What the attributes of a variable say of its values (NetCDF Users Guide, "Attribute Conventions"): which are missing, and
-// how the others were packed into small whole numbers: value = packed scale_factor + add_offset.
-class Packing {
-  public:
-    Packing(const FoundVariable& variable, const std::filesystem::path& path)
-        : variable_(variable), path_(path) {
-        if (const Attribute* fill = find("_FillValue", 1)) {
-            missing_.push_back(fill->values.front());
-        } else if (const std::optional<double> usual = default_fill(variable.type)) {
-            missing_.push_back(*usual);
-        }
-        if (const Attribute* missing = find("missing_value", 0)) add_missing(*missing);
-        // As the variable holds them.
-        if (variable.type == kFloats)
-            for (double& value : missing_) value = double(float(value));
-        std::erase_if(missing_, [](double value) { return std::isnan(value); });
-        std::ranges::sort(missing_);
-        missing_.erase(std::unique(missing_.begin(), missing_.end()), missing_.end());
-        std::uint32_t unpacked_type = 0;
-        for (const auto& [name, to] :
-             {std::pair("scale_factor", &scale_), std::pair("add_offset", &offset_)}) {
-            const Attribute* number = find(name, 1);
-            if (number == nullptr) continue;
-            *to = number->values.front();
-            if (!std::isfinite(*to)) fail(name, "is not finite");
-            unpacked_type = std::max(unpacked_type, number->type);
-        }
-        range(unpacked_type);
-    }
-
-    // NaN where the value is missing, or outside the valid range.
-    double operator()(double packed) const {
-        if (std::isnan(packed) || std::ranges::binary_search(missing_, packed)) return std::nan("");
-        const double value = packed * scale_ + offset_, checked = range_is_unpacked_ ? value : packed;
-        return checked >= low_ && checked <= high_ ? value : std::nan("");
-    }
-
-  private:
-    [[noreturn]] void fail(const std::string& attribute, const std::string& message) const {
-        throw Error(ErrorCode::io, fmt::format("{}: the attribute {} of the variable {} {}", path_.string(),
-                                               attribute, shortened(variable_.name), message));
-    }
-
-    void add_missing(const Attribute& attribute) {
-        if (attribute.count > kMostOfAttribute)
-            fail("missing_value",
-                 fmt::format("has {} values: expected at most {}", attribute.count, kMostOfAttribute));
-        missing_.insert(missing_.end(), attribute.values.begin(), attribute.values.end());
-    }
-
-    // An attribute with that many numbers, with any number of them if `count` is 0.
-    const Attribute* find(const std::string& name, std::size_t count) const {
-        const auto found = variable_.attributes.find(name);
-        if (found == variable_.attributes.end()) return nullptr;
-        const Attribute& attribute = found->second;
-        // The fill of characters is a character: it says nothing of numbers.
-        if (attribute.type == kCharacters && variable_.type == kCharacters) return nullptr;
-        if (attribute.type == kCharacters) fail(name, "is a text: expected a number");
-        if (count > 0 && attribute.count != count)
-            fail(name, fmt::format("has {} values: expected {}", attribute.count, count));
-        return &attribute;
-    }
-
-    // The range is of packed values, unless it has the type of the unpacked ones and that is the wider, or is of real numbers
-    // where the packed ones are whole.
-    void range(std::uint32_t unpacked_type) {
-        const auto is_unpacked = [&](const Attribute& attribute) {
-            const auto is_real = [](std::uint32_t type) { return type == kFloats || type == kDoubles; };
-            if (unpacked_type == 0) return false;
-            return (is_real(attribute.type) && !is_real(variable_.type)) ||
-                   (attribute.type == unpacked_type &&
-                    size_of_type(unpacked_type, path_) > size_of_type(variable_.type, path_));
-        };
-        if (const Attribute* both = find("valid_range", 2)) {
-            low_ = both->values[0];
-            high_ = both->values[1];
-            range_is_unpacked_ = is_unpacked(*both);
-            if (!(low_ <= high_)) fail("valid_range", fmt::format("is empty: {} to {}", low_, high_));
-            return;
-        }
-        if (const Attribute* least = find("valid_min", 1)) {
-            low_ = least->values.front();
-            range_is_unpacked_ = is_unpacked(*least);
-        }
-        if (const Attribute* most = find("valid_max", 1)) {
-            high_ = most->values.front();
-            range_is_unpacked_ = is_unpacked(*most);
-        }
-    }
-
-    const FoundVariable& variable_;
-    const std::filesystem::path& path_;
-    std::vector<double> missing_;  // packed, in order, without NaN
-    double scale_ = 1, offset_ = 0;
-    double low_ = -std::numeric_limits<double>::infinity(), high_ = std::numeric_limits<double>::infinity();
-    bool range_is_unpacked_ = false;
+    std::uint64_t begin = 0, attributes_at = 0;  // bytes of the file
 };
 
 Reader opened(const std::filesystem::path& path) {
@@ -396,20 +211,87 @@ const FoundVariable& variable_named(const std::vector<FoundVariable>& variables,
     return *found;
 }
 
-// A dimension with what its coordinate variable says. Values that lie beyond the end of the file are left out: no
-// other value depends on them.
-// The values of a coordinate variable follow each other, or those of the dimension of records at this distance.
-NetcdfAxis axis_of(Reader& reader, const std::vector<FoundVariable>& variables, std::uint64_t dimension,
-                   const NetcdfDimension& named, std::optional<std::uint64_t> distance,
+// The lists at the beginning of a file.
+struct Head {
+    std::uint64_t records = 0;
+    std::vector<NetcdfDimension> dimensions;  // of size 0: that of records
+    std::vector<FoundVariable> variables;
+    std::uint64_t record_variables = 0;
+    std::uint64_t record_bytes = 0;  // of all of them, each padded
+
+    std::uint64_t size_of_dimension(std::uint64_t n) const {
+        return dimensions[n].size == 0 ? records : dimensions[n].size;
+    }
+    bool has_records(const FoundVariable& variable) const {
+        return !variable.dimensions.empty() && dimensions[variable.dimensions[0]].size == 0;
+    }
+};
+
+FoundVariable next_variable(Reader& reader, const std::vector<NetcdfDimension>& dimensions,
+                            const std::filesystem::path& path) {
+    FoundVariable variable;
+    variable.name = reader.name();
+    const std::uint64_t rank = reader.count();
+    if (rank > kMostDimensions)
+        throw Error(ErrorCode::io, fmt::format("{}: has a variable of {} dimensions; at most {} can be read",
+                                               path.string(), rank, kMostDimensions));
+    for (std::uint64_t n = 0; n < rank; ++n) {
+        variable.dimensions.push_back(reader.count());
+        if (variable.dimensions.back() >= dimensions.size())
+            throw Error(ErrorCode::io, path.string() + ": is damaged");
+    }
+    variable.attributes_at = reader.at();
+    skip_attributes(reader, path);
+    variable.type = next_type(reader, path);
+    reader.count();  // of bytes: redundant, and wrong in some files (classic format, note on vsize)
+    variable.begin = reader.offset();
+    return variable;
+}
+
+// Returns the bytes of a variable in a record, padded.
+std::uint64_t bytes_in_record(const FoundVariable& variable, const std::vector<NetcdfDimension>& dimensions,
+                              const std::filesystem::path& path) {
+    constexpr std::uint64_t kPadding = 4;
+    std::uint64_t bytes = size_of(variable.type);
+    for (std::size_t n = 1; n < variable.dimensions.size(); ++n)
+        if (__builtin_mul_overflow(bytes, dimensions[variable.dimensions[n]].size, &bytes))
+            throw Error(ErrorCode::io, path.string() + ": is damaged");
+    return (bytes + kPadding - 1) / kPadding * kPadding;
+}
+
+Head read_head(Reader& reader, const std::filesystem::path& path) {
+    Head head;
+    head.records = reader.count();
+    reader.next<std::uint32_t>();
+    for (std::uint64_t left = checked_count(reader, "dimensions", path); left > 0; --left) {
+        std::string dimension = reader.name();
+        head.dimensions.push_back({std::move(dimension), reader.count()});
+    }
+    skip_attributes(reader, path);
+    reader.next<std::uint32_t>();
+    for (std::uint64_t left = checked_count(reader, "variables", path); left > 0; --left) {
+        const FoundVariable& variable =
+            head.variables.emplace_back(next_variable(reader, head.dimensions, path));
+        if (!head.has_records(variable)) continue;
+        head.record_bytes += bytes_in_record(variable, head.dimensions, path);
+        ++head.record_variables;
+    }
+    return head;
+}
+
+// Returns a dimension with what its coordinate variable says. Values that lie beyond the end of the file are left out: no other
+// value depends on them.
+NetcdfAxis axis_of(Reader& reader, const Head& head, std::uint64_t dimension,
                    const std::filesystem::path& path) {
+    const NetcdfDimension named{head.dimensions[dimension].name, head.size_of_dimension(dimension)};
     NetcdfAxis axis{named.name, named.size, {}, {}, {}, {}, {}, {}};
-    const auto coordinate = std::ranges::find_if(variables, [&](const FoundVariable& variable) {
+    const auto coordinate = std::ranges::find_if(head.variables, [&](const FoundVariable& variable) {
         return variable.name == named.name && variable.dimensions == std::vector{dimension};
     });
-    if (coordinate == variables.end()) return axis;
+    if (coordinate == head.variables.end()) return axis;
     FoundVariable variable = *coordinate;
     variable.attributes = attributes_at(reader, coordinate->attributes_at, path);
-    const Attributes& attributes = variable.attributes;
+    const auto& attributes = variable.attributes;
     for (const auto& [name, to] :
          {std::pair("axis", &axis.axis), std::pair("standard_name", &axis.standard_name),
           std::pair("units", &axis.units), std::pair("positive", &axis.positive)}) {
@@ -418,10 +300,12 @@ NetcdfAxis axis_of(Reader& reader, const std::vector<FoundVariable>& variables, 
         *to = attribute->second.text;
         while (!to->empty() && (to->back() == '\0' || to->back() == ' ')) to->pop_back();
     }
-    if (named.size == 0 || variable.type == kCharacters) return axis;
-    const std::uint64_t bytes = size_of_type(variable.type, path);
+    if (named.size == 0 || variable.type == NetcdfType::text) return axis;
+    // They follow each other, or are as far apart as records.
+    const std::uint64_t bytes = size_of(variable.type);
+    const bool is_apart = head.has_records(variable) && head.record_variables > 1;
     std::uint64_t to_last = 0;
-    if (__builtin_mul_overflow(named.size - 1, distance.value_or(bytes), &to_last) ||
+    if (__builtin_mul_overflow(named.size - 1, is_apart ? head.record_bytes : bytes, &to_last) ||
         variable.begin > reader.size() || to_last > reader.size() - variable.begin ||
         bytes > reader.size() - variable.begin - to_last)
         return axis;
@@ -441,7 +325,7 @@ struct NetcdfSource::Variable {
     std::filesystem::path path;
     Reader reader;
     FoundVariable found;
-    std::optional<Packing> packing;
+    std::optional<NetcdfPacking> packing;
     std::vector<NetcdfAxis> axes;
     bool is_record = false;
     std::uint64_t in_record = 1, record_bytes = 0;
@@ -457,81 +341,34 @@ const std::vector<NetcdfAxis>& NetcdfSource::axes() const { return variable_->ax
 NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string& name)
     : variable_(new Variable{path, opened(path), {}, {}, {}}) {
     Reader& reader = variable_->reader;
-    const std::uint64_t records = reader.count();
-    std::vector<NetcdfDimension> dimensions;
-    reader.next<std::uint32_t>();
-    for (std::uint64_t left = checked_count(reader, "dimensions", path); left > 0; --left) {
-        std::string dimension = reader.name();
-        dimensions.push_back({std::move(dimension), reader.count()});
-    }
-    skip_attributes(reader, path);
-    reader.next<std::uint32_t>();
-    std::vector<FoundVariable> variables;
-    std::uint64_t record_bytes = 0, record_variables = 0;
-    for (std::uint64_t left = checked_count(reader, "variables", path); left > 0; --left) {
-        FoundVariable& variable = variables.emplace_back();
-        variable.name = reader.name();
-        const std::uint64_t rank = reader.count();
-        if (rank > kMostDimensions)
-            throw Error(ErrorCode::io,
-                        fmt::format("{}: has a variable of {} dimensions; at most {} can be read",
-                                    path.string(), rank, kMostDimensions));
-        for (std::uint64_t n = 0; n < rank; ++n) {
-            variable.dimensions.push_back(reader.count());
-            if (variable.dimensions.back() >= dimensions.size())
-                throw Error(ErrorCode::io, path.string() + ": is damaged");
-        }
-        variable.attributes_at = reader.at();
-        skip_attributes(reader, path);
-        variable.type = reader.next<std::uint32_t>();
-        reader.count();  // of bytes: redundant
-        variable.begin = reader.offset();
-        if (!variable.dimensions.empty() && dimensions[variable.dimensions[0]].size == 0) {
-            // By dimensions and type: what is stated is redundant, and wrong in some files (classic format, note on vsize).
-            constexpr std::uint64_t kPadding = 4;
-            std::uint64_t bytes = size_of_type(variable.type, path);
-            for (std::size_t n = 1; n < variable.dimensions.size(); ++n)
-                if (__builtin_mul_overflow(bytes, dimensions[variable.dimensions[n]].size, &bytes))
-                    throw Error(ErrorCode::io, path.string() + ": is damaged");
-            record_bytes += (bytes + kPadding - 1) / kPadding * kPadding;
-            ++record_variables;
-        }
-    }
-    // Records of a file's only record variable follow each other without padding (NetCDF classic format, note on vsize).
-    const auto distance_of = [&](const NetcdfDimension& dimension) {
-        const bool is_apart = dimension.size == 0 && record_variables > 1;
-        return is_apart ? std::optional(record_bytes) : std::nullopt;
-    };
-    const FoundVariable* found = &variable_named(variables, name, path);
+    const Head head = read_head(reader, path);
+    const FoundVariable& found = variable_named(head.variables, name, path);
     Variable& data = *variable_;
     std::uint64_t count = 1;
-    for (std::size_t n = 0; n < found->dimensions.size(); ++n) {
-        const NetcdfDimension& dimension = dimensions[found->dimensions[n]];
-        const std::uint64_t size = dimension.size == 0 ? records : dimension.size;
+    for (std::size_t n = 0; n < found.dimensions.size(); ++n) {
+        const std::uint64_t dimension = found.dimensions[n], size = head.size_of_dimension(dimension);
         // Those of more dimensions are no mask, and nobody asks for their coordinates.
         constexpr std::size_t kMostOfMask = 4;  // time, z, y, x
-        data.axes.push_back(found->dimensions.size() > kMostOfMask
-                                ? NetcdfAxis{dimension.name, size, {}, {}, {}, {}, {}, {}}
-                                : axis_of(reader, variables, found->dimensions[n], {dimension.name, size},
-                                          distance_of(dimension), path));
+        data.axes.push_back(found.dimensions.size() > kMostOfMask
+                                ? NetcdfAxis{head.dimensions[dimension].name, size, {}, {}, {}, {}, {}, {}}
+                                : axis_of(reader, head, dimension, path));
         if (size == 0 || count > reader.size() / size)
             throw Error(ErrorCode::io, path.string() + ": is damaged or empty");
         count *= size;
         if (n > 0) data.in_record *= size;
     }
-    data.is_record = dimensions[found->dimensions[0]].size == 0;
-    data.found = *found;
-    data.found.attributes = attributes_at(reader, found->attributes_at, path);
+    data.is_record = head.has_records(found);
+    data.found = found;
+    data.found.attributes = attributes_at(reader, found.attributes_at, path);
     // Records of a file's only record variable follow each other without padding (NetCDF classic format, note on vsize).
-    data.record_bytes =
-        record_variables == 1 ? data.in_record * size_of_type(data.found.type, path) : record_bytes;
+    data.record_bytes = head.record_variables == 1 ? data.in_record * size_of(found.type) : head.record_bytes;
     take_as_unsigned(data.found);
     data.packing.emplace(data.found, data.path);
 }
 
 void NetcdfSource::read(std::uint64_t first, std::span<double> values) const {
     const Variable& v = *variable_;
-    const std::uint64_t bytes = size_of_type(v.found.type, v.path);
+    const std::uint64_t bytes = size_of(v.found.type);
     for (std::size_t n = 0; n < values.size(); ++n) {
         const std::uint64_t place = first + n;
         const std::uint64_t at =
