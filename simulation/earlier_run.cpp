@@ -2,7 +2,6 @@
 #include "simulation/earlier_run.h"
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <map>
 #include <system_error>
@@ -16,27 +15,16 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "core/file_stamp.h"
 #include "core/paths.h"
 #include "scenes/format/writer.h"
 #include "simulation/manifest.h"
-#include "simulation/run_listing.h"
+#include "simulation/own_files.h"
 #include "simulation/statistics_file.h"
 
 namespace nephos {
 namespace {
 
 using Parameters = std::vector<std::pair<std::string, std::string>>;
-
-bool is_frame_of(const std::string& file, const std::string& name) {
-    if (!file.starts_with(name + "_")) return false;
-    const std::size_t dot = file.rfind('.');
-    const std::string extension = dot == file.npos ? "" : file.substr(dot);
-    if (extension != ".vdb" && extension != ".png" && extension != ".exr") return false;
-    const std::string number = file.substr(name.size() + 1, dot - name.size() - 1);
-    return number.size() >= 4 &&
-           std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
-}
 
 void remove_file(const std::filesystem::path& path) {
     std::error_code error;
@@ -99,51 +87,22 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
                             folder.folder.string(), reason));
 }
 
-// Files of a complete run by their paths below its folder.
-std::map<std::string, FileDigest> listed_files(const RunFolder& folder) {
-    const RunListing run = read_run(folder.folder);
-    std::map<std::string, FileDigest> files;
-    const auto add = [&](const std::vector<FileRecord>& records) {
-        for (const FileRecord& record : records) files.emplace(record.path, record.digest);
-    };
-    for (const ListedFrame& frame : run.frames) add(frame.files);
-    add(run.run_files);
-    return files;
+void refuse_foreign_table(const RunFolder& folder, const std::filesystem::path& table,
+                          std::string_view header) {
+    if (!stands_there(table) || is_statistics(table, header) || is_begun_statistics(table, header)) return;
+    refuse(folder, fmt::format("the folder holds a {} that is not of a run",
+                               table.lexically_relative(folder.folder).string()));
 }
 
-// Returns whether a run of frames `range` writes a frame to this path.
-bool is_frame_place(const RunFolder& folder, const Scene& scene, const SimulationRange& range,
-                    const std::filesystem::path& file) {
-    const std::string name = file.filename().string();
-    const std::size_t begin = folder.name.size() + 1;
-    int number = 0;
-    if (!is_frame_of(name, folder.name)) return false;
-    const auto parsed = std::from_chars(name.data() + begin, name.data() + name.size(), number);
-    if (parsed.ec != std::errc() || number < range.first_frame || number > range.last_frame) return false;
-    std::vector<std::filesystem::path> places = density_files(folder, scene, number);
-    for (const char* extension : {".png", ".exr"}) places.push_back(folder.picture(number, extension));
-    return std::ranges::count(places, file) > 0;
-}
-
-// Throws Error(usage) where a frame, a picture or a video of the earlier run's name is none of its files, or not as it wrote it: a
-// copy that the user keeps, or that of another run behind a link. Of a run that is not complete its frames' places tell it.
-void refuse_to_lose_others(const RunFolder& folder, const RunSettings& settings, const EarlierRun& earlier,
-                           const std::vector<std::filesystem::path>& files) {
-    std::map<std::string, FileDigest> listed;
-    if (earlier.complete) listed = listed_files(folder);
-    const bool has_list = earlier.complete && !listed.empty();  // none of earlier versions
-    for (const std::filesystem::path& file : files) {
-        const bool is_video = file == folder.video();
-        if (!is_video && !is_frame_of(file.filename().string(), folder.name))
-            continue;  // others are looked at apart
-        const std::string path = file.lexically_relative(folder.folder).generic_string();
-        const auto found = listed.find(path);
-        const bool is_own = has_list   ? found != listed.end()
-                            : is_video ? wants_video(settings.scene)
-                                       : is_frame_place(folder, settings.scene, earlier.range, file);
-        if (!is_own) refuse(folder, fmt::format("there is {}, which the run in it has not written", path));
-        if (has_list && !(file_digest(file) == found->second))
-            refuse(folder, fmt::format("{} is not what the run in it has written", path));
+// Reads the manifest of the run that is in the folder.
+EarlierRun manifest_of_run(const RunFolder& folder) {
+    try {
+        return read_manifest(folder.manifest());
+    } catch (const ReadFailure&) {
+        throw;
+    } catch (const Error& reason) {
+        refuse(folder,
+               fmt::format("the folder holds a manifest.json that is not of a run ({})", reason.what()));
     }
 }
 
@@ -232,6 +191,24 @@ Scene scene_before(const EarlierRun& earlier, const RunSettings& settings, const
                             folder.folder.string(), hashes, difference(earlier, settings, before)));
 }
 
+// Throws Error(usage) when the run in the folder is not that of the settings, or began otherwise.
+void refuse_other_run(const RunFolder& folder, const EarlierRun& earlier, const RunSettings& settings,
+                      const std::vector<RunInput>& inputs, Resumption found) {
+    if (found == Resumption::start_anew) {
+        scene_before(earlier, settings, folder);  // which may have fewer steps
+    } else if (earlier.scene_hash != settings.scene_hash) {
+        refuse(folder, fmt::format("it holds a run of '{}' with another scene or seed ({})", earlier.name,
+                                   changed_keys(earlier, settings)));
+    }
+    const std::string changed = changed_inputs(
+        earlier.inputs, inputs, {FileKind::first_state, FileKind::simulation, FileKind::picture});
+    if (earlier.simulation_hash != settings.simulation_hash || !changed.empty()) {
+        refuse(folder, fmt::format("it holds a run of '{}' with another beginning ({})", earlier.name,
+                                   changed.empty() ? other_content(earlier, settings)
+                                                   : "another content of " + changed));
+    }
+}
+
 // Throws Error(usage) when frames that are to come would be drawn with other pictures than those that are there.
 void refuse_other_pictures(const EarlierRun& earlier, const std::vector<RunInput>& inputs,
                            const RunFolder& folder) {
@@ -284,18 +261,14 @@ void remove_leftovers(const RunFolder& folder) {
 }
 
 void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs) {
-    std::map<std::pair<std::uint64_t, std::uint64_t>, const RunInput*> begins_with;
-    for (const RunInput& input : inputs) {
-        const std::filesystem::path path = path_of(folder.folder, input.path);
-        const FileStamp stamp = file_stamp(path);
-        if (stamp.inode == 0 && is_there(path)) throw ReadFailure(path, "it changes", "examine");
-        if (stamp.inode != 0) begins_with[{stamp.device, stamp.inode}] = &input;
-    }
+    std::map<FileIdentity, const RunInput*> begins_with;
+    for (const RunInput& input : inputs)
+        if (const auto identity = identity_behind(path_of(folder.folder, input.path)))
+            begins_with[*identity] = &input;
     if (begins_with.empty()) return;
     for (const std::filesystem::path& file : earlier_files(folder)) {
-        const FileStamp stamp = file_stamp(file);
-        if (stamp.inode == 0 && is_there(file)) throw ReadFailure(file, "it changes", "examine");
-        const auto found = begins_with.find({stamp.device, stamp.inode});
+        const std::optional<FileIdentity> identity = identity_behind(file);
+        const auto found = identity ? begins_with.find(*identity) : begins_with.end();
         if (found == begins_with.end()) continue;
         throw Error(ErrorCode::usage, fmt::format("{}: is what `{}` names, and a file of the run in {}, "
                                                   "which is replaced: choose another --out",
@@ -310,7 +283,7 @@ void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& s
                                .first_frame = earlier.range.last_frame + 1,
                                .last_frame = settings.range.last_frame};
     for (const std::filesystem::path& file : earlier_files(folder)) {
-        if (!is_frame_place(folder, settings.scene, next, file)) continue;
+        if (!is_frame_place(folder, settings.scene, next, settings.render, file)) continue;
         throw Error(ErrorCode::usage,
                     fmt::format("{}: would be replaced by the next frame of the run, which has not written it: "
                                 "move it away, or start anew with --overwrite",
@@ -320,65 +293,38 @@ void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& s
 
 void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
                     Resumption found) {
-    for (const LayerOptions& layer : settings.scene.layers) {
-        const std::filesystem::path table = folder.statistics(layer.name);
-        if (!stands_there(table) || is_statistics(table, kLayerStatisticsHeader) ||
-            is_begun_statistics(table, kLayerStatisticsHeader))
-            continue;
-        refuse(folder, fmt::format("the folder holds a {} that is not of a run",
-                                   table.lexically_relative(folder.folder).string()));
-    }
+    for (const LayerOptions& layer : settings.scene.layers)
+        refuse_foreign_table(folder, folder.statistics(layer.name), kLayerStatisticsHeader);
     const std::vector<std::filesystem::path> files = earlier_files(folder);
     if (files.empty()) return;
     if (files.back() != folder.manifest()) {
         refuse(folder, fmt::format("there is {}, but no manifest.json that says that it is of a run",
                                    files.back().lexically_relative(folder.folder).string()));
     }
-    EarlierRun earlier;
-    try {
-        earlier = read_manifest(folder.manifest());
-    } catch (const ReadFailure&) {
-        throw;
-    } catch (const Error& reason) {
-        refuse(folder,
-               fmt::format("the folder holds a manifest.json that is not of a run ({})", reason.what()));
-    }
-    const auto is_listed = [&](const std::filesystem::path& file) {
-        return std::ranges::count(files, file) > 0;
-    };
-    if (is_listed(folder.statistics()) && !is_statistics(folder.statistics()) &&
-        !is_begun_statistics(folder.statistics())) {
-        refuse(folder, "the folder holds a statistics.csv that is not of a run");
-    }
-    if (found == Resumption::start_anew) {
-        scene_before(earlier, settings, folder);  // which may have fewer steps
-    } else if (earlier.scene_hash != settings.scene_hash) {
-        refuse(folder, fmt::format("it holds a run of '{}' with another scene or seed ({})", earlier.name,
-                                   changed_keys(earlier, settings)));
-    }
-    const std::string changed = changed_inputs(
-        earlier.inputs, inputs, {FileKind::first_state, FileKind::simulation, FileKind::picture});
-    if (earlier.simulation_hash != settings.simulation_hash || !changed.empty()) {
-        refuse(folder, fmt::format("it holds a run of '{}' with another beginning ({})", earlier.name,
-                                   changed.empty() ? other_content(earlier, settings)
-                                                   : "another content of " + changed));
-    }
-    refuse_to_lose_others(folder, settings, earlier, files);
+    const EarlierRun earlier = manifest_of_run(folder);
+    refuse_foreign_table(folder, folder.statistics(), kStatisticsHeader);
+    refuse_other_run(folder, earlier, settings, inputs, found);
     if (earlier.complete && !makes_again(earlier, settings)) {
         refuse(folder, fmt::format("it holds a complete run for {}, not all of which would be made again",
                                    range_text(earlier)));
     }
-    if (!is_listed(folder.checkpoint())) return;
-    if (!is_checkpoint(folder.checkpoint())) {
+    const bool has_checkpoint = std::ranges::count(files, folder.checkpoint()) > 0;
+    if (has_checkpoint && !is_checkpoint(folder.checkpoint()))
         refuse(folder, "the folder holds a checkpoint.nephos that is not of a run");
+    if (has_checkpoint && !earlier.complete) {
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: holds an interrupted run of '{}' ({} of {} steps): give --resume to go on, or "
+                        "--overwrite to start anew",
+                        folder.folder.string(), earlier.name,
+                        earlier.steps_reported == 0 ? 0 : earlier.steps_reported - 1,
+                        earlier.range.last_step));
     }
-    if (earlier.complete) return;
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("{}: holds an interrupted run of '{}' ({} of {} steps): give --resume to go on, or "
-                    "--overwrite to start anew",
-                    folder.folder.string(), earlier.name,
-                    earlier.steps_reported == 0 ? 0 : earlier.steps_reported - 1, earlier.range.last_step));
+    const OwnFiles own(folder, earlier, settings.scene);
+    for (const std::filesystem::path& file : files) {
+        if (file == folder.manifest()) continue;
+        if (const std::optional<std::string> why = own.why_foreign(file)) refuse(folder, *why);
+    }
 }
 
 Resumption find_resumption(const RunSettings& settings, const RunFolder& folder) {

@@ -206,7 +206,22 @@ class Keeping(Case):
         def video(out):
             (out / "frames").mkdir(exist_ok=True)
             (out / "frames/tiny.mp4").write_text("mine")
-        for number, (put, says) in enumerate(((copies, "density/old/tiny_0001.vdb, which the run in it has not written"),
+        def table(out):
+            (out / "statistics").mkdir()
+            (out / "statistics/mine.csv").write_text(layer_table)
+        def other_table(out):
+            shutil.copy(self.folder / "other/statistics.csv", out)
+        def other_checkpoint(out):
+            shutil.copy(self.folder / "other/checkpoint.nephos", out)
+        def nowhere(out):
+            (out / "density/tiny_0001.vdb").unlink()
+            (out / "density/tiny_0001.vdb").symlink_to("nowhere")
+        self.call("run", self.write("layered.toml", LAYERED), "--no-render", "--out", "layers")
+        layer_table = (self.folder / "layers/statistics/low.csv").read_text()
+        for number, (put, says) in enumerate(((table, "there is statistics/mine.csv, which the run in it has not written"),
+                                              (other_table, "statistics.csv is not what the run in it has written"),
+                                              (other_checkpoint, "checkpoint.nephos is not what the run in it"),
+                                              (nowhere, "density/tiny_0001.vdb is not what the run in it"), (copies, "density/old/tiny_0001.vdb, which the run in it has not written"),
                                               (linked, "density/other/tiny_0001.vdb, which"), (exchanged, "density/tiny_0001.vdb is not what"),
                                               (named, "density/tiny_0099.vdb, which"), (picture, "frames/tiny_0001.png, which"),
                                               (video, "frames/tiny.mp4, which"))):
@@ -229,8 +244,29 @@ class Keeping(Case):
         copies(self.folder / "begun")
         self.kept("begun", 2, *self.plain, "--out", "begun", says="density/old/tiny_0001.vdb, which")
         shutil.rmtree(self.folder / "begun/density/old")
+        for put, says in ((table, "there is statistics/mine.csv"), (picture, "there is frames/tiny_0001.png"),
+                          (video, "there is frames/tiny.mp4")):
+            put(self.folder / "begun")
+            self.kept("begun", 2, *self.plain, "--out", "begun", says=says)
+            for folder in ("statistics", "frames"):
+                shutil.rmtree(self.folder / "begun" / folder, ignore_errors=True)
         self.call(*self.plain, "--out", "begun")
         self.call("verify", "begun")
+
+    def test_tables_of_layers_behind_a_link(self):
+        """Those of another run: neither a complete run that is made again takes their place, nor one that was killed."""
+        scene = self.write("layered.toml", LAYERED)
+        self.call("run", scene, "--no-render", "--out", "a")
+        self.call("run", scene, "--no-render", "--out", "b", "--seed", "8")
+        shutil.rmtree(self.folder / "a/statistics")
+        (self.folder / "a/statistics").symlink_to("../b/statistics")
+        other = self.files("b")
+        self.kept("a", 2, "run", scene, "--no-render", "--out", "a", says="statistics/low.csv is not what the run in it has written")
+        manifest = self.folder / "a/manifest.json"
+        manifest.write_text(unsealed({**json.loads(manifest.read_text()), "complete": False}))
+        (self.folder / "a/checkpoint.nephos").unlink()
+        self.kept("a", 2, "run", scene, "--no-render", "--out", "a", says="statistics/low.csv is not what the run in it has written")
+        self.assertEqual(self.files("b"), other)
 
     def test_a_file_called_like_the_next_frame(self):
         self.call(*self.plain, "--set", "time.steps=4", "--out", "run")

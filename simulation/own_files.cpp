@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/own_files.h"
+
+#include <algorithm>
+#include <charconv>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "core/paths.h"
+#include "simulation/run_listing.h"
+
+namespace nephos {
+namespace {
+
+// Returns whether a file is there whose first bytes have this digest; `whole`: and no byte more.
+bool has_content(const std::filesystem::path& file, const FileDigest& digest, bool whole) {
+    if (type_behind(file) != std::filesystem::file_type::regular) return false;
+    std::error_code error;
+    const std::uintmax_t bytes = std::filesystem::file_size(file, error);
+    if (!error && (whole ? bytes != digest.bytes : bytes < digest.bytes)) return false;
+    return file_digest(file, whole ? ~std::uint64_t{0} : digest.bytes) == digest;
+}
+
+}  // namespace
+
+bool is_frame_of(const std::string& file, const std::string& name) {
+    if (!file.starts_with(name + "_")) return false;
+    const std::size_t dot = file.rfind('.');
+    const std::string extension = dot == file.npos ? "" : file.substr(dot);
+    if (extension != ".vdb" && extension != ".png" && extension != ".exr") return false;
+    const std::string number = file.substr(name.size() + 1, dot - name.size() - 1);
+    return number.size() >= 4 &&
+           std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+bool is_frame_place(const RunFolder& folder, const Scene& scene, const SimulationRange& range, bool pictures,
+                    const std::filesystem::path& file) {
+    const std::string name = file.filename().string();
+    const std::size_t begin = folder.name.size() + 1;
+    int number = 0;
+    if (!is_frame_of(name, folder.name)) return false;
+    const auto parsed = std::from_chars(name.data() + begin, name.data() + name.size(), number);
+    if (parsed.ec != std::errc() || number < range.first_frame || number > range.last_frame) return false;
+    return std::ranges::count(density_files(folder, scene, number), file) > 0 ||
+           (pictures && std::ranges::count(picture_files(folder, scene, number), file) > 0);
+}
+
+OwnFiles::OwnFiles(RunFolder folder, EarlierRun run, const Scene& scene)
+    : folder_(std::move(folder)), run_(std::move(run)), scene_(scene) {
+    folder_.name = run_.name;
+    if (!run_.complete) return;
+    const RunListing listing = read_run(folder_.folder);
+    const auto add = [&](const std::vector<FileRecord>& records) {
+        for (const FileRecord& record : records) listed_.emplace(record.path, record.digest);
+    };
+    for (const ListedFrame& frame : listing.frames) add(frame.files);
+    add(listing.run_files);
+    lists_tables_ = !listing.run_files.empty();
+}
+
+bool OwnFiles::is_place(const std::filesystem::path& file) const {
+    const bool has_video = run_.render && wants_video(scene_);
+    return file == folder_.statistics() || file == folder_.checkpoint() ||
+           (has_video && file == folder_.video()) ||
+           std::ranges::any_of(
+               scene_.layers,
+               [&](const LayerOptions& layer) { return file == folder_.statistics(layer.name); }) ||
+           is_frame_place(folder_, scene_, run_.range, run_.render, file);
+}
+
+std::optional<std::string> OwnFiles::why_foreign(const std::filesystem::path& file) const {
+    const std::string path = file.lexically_relative(folder_.folder).generic_string();
+    const std::string other = fmt::format("{} is not what the run in it has written", path);
+    const bool is_frame = is_frame_of(file.filename().string(), folder_.name) || file == folder_.video();
+    if (const auto found = listed_.find(path); found != listed_.end())
+        return has_content(file, found->second, true) ? std::nullopt : std::optional(other);
+    if ((is_frame ? !listed_.empty() : lists_tables_) || !is_place(file))
+        return fmt::format("there is {}, which the run in it has not written", path);
+    const auto table = std::ranges::find(run_.tables, path, &FileRecord::path);
+    if (table != run_.tables.end() && !has_content(file, table->digest, false)) return other;
+    return std::nullopt;
+}
+
+}  // namespace nephos

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Tells the files that the run in a folder has written from those that others have put there.
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "core/digest.h"
+#include "scenes/format/scene.h"
+#include "simulation/manifest.h"
+#include "simulation/run_folder.h"
+
+namespace nephos {
+
+// Returns whether a file has the name of a frame of a run of this name: NAME_0001.vdb, .png or .exr.
+bool is_frame_of(const std::string& file, const std::string& name);
+
+// Returns whether a run of the scene writes a frame of `range` to this path, or a picture of it where it has `pictures`.
+bool is_frame_place(const RunFolder& folder, const Scene& scene, const SimulationRange& range, bool pictures,
+                    const std::filesystem::path& file);
+
+// The files of a run. Of a complete one its manifest lists them with their checksums; of others, and of those of earlier versions,
+// the places tell them to which it writes, and of a table its beginning as far as the manifest lists it.
+class OwnFiles {
+  public:
+    // `scene`: of the run; must outlive this. Throws Error(io) where the manifest cannot be read.
+    OwnFiles(RunFolder folder, EarlierRun run, const Scene& scene);
+
+    // Returns what is wrong with a file that the run has not written, as a sentence without its end; nothing where it has. Reads the
+    // file. Throws ReadFailure.
+    std::optional<std::string> why_foreign(const std::filesystem::path& file) const;
+
+  private:
+    bool is_place(const std::filesystem::path& file) const;
+
+    RunFolder folder_;
+    EarlierRun run_;
+    const Scene& scene_;
+    std::map<std::string, FileDigest> listed_;  // by path below the folder
+    bool lists_tables_ = false;
+};
+
+}  // namespace nephos
