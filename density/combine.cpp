@@ -269,10 +269,4 @@ DensityGrid scaled(const DensityGrid& grid, double factor) {
     return builder.finish(grid.extent(), grid.placement());
 }
 
-DensityGrid placed_at(const DensityGrid& grid, const Placement& placement) {
-    const auto tree = OpenvdbAccess::grid(grid).treePtr();
-    return OpenvdbAccess::wrap(FloatGrid::create(openvdb::ConstPtrCast<FloatTree>(tree)), grid.extent(),
-                               placement);
-}
-
 }  // namespace nephos

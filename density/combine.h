@@ -36,7 +36,4 @@ DensityGrid combine(std::span<const DensityGrid> grids, std::span<const Boundari
 // Returns the grid with every value multiplied by `factor`, above 0 and at most 1; Error(usage) otherwise.
 DensityGrid scaled(const DensityGrid& grid, double factor);
 
-// Returns the same voxels, shared, at another place or of another size.
-DensityGrid placed_at(const DensityGrid& grid, const Placement& placement);
-
 }  // namespace nephos

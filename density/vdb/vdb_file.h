@@ -6,7 +6,7 @@
 //
 // World and index space of a file: metres, right-handed, z up; OpenVDB's index (i, j, k) is the CENTRE of
 // voxel (i, j, k), so the transform is: world = (i, j, k) * voxel + origin + voxel / 2. All grids of a file
-// share it.
+// share it, but for the wind over large boxes, whose voxels are larger.
 //
 // clang-format off
 //
@@ -34,8 +34,8 @@
 //     nephos_state_hash                 string   hash of the automaton's state at or before this frame
 //     nephos_version                    string   version of nephos that wrote the file
 //     nephos_random_stream_version      int32    version of the random stream
-//     nephos_refine                     int32    voxels per cell and axis
-//     nephos_bbox_min, nephos_bbox_max  vec3i    bounds of the voxels, both included; constant over a sequence
+//     nephos_refine                     int32    voxels per cell and axis; in a grid: of that grid
+//     nephos_bbox_min, nephos_bbox_max  vec3i    bounds of the voxels, both included; constant over a sequence; in a grid: its own
 //     nephos_wind                       string   "[[height m, east m/s, north m/s], ...]"; missing in calm air
 //     nephos_period_m                   vec3d    where it repeats, metres; 0 on an axis that does not
 //
@@ -90,6 +90,8 @@ struct VdbContent {
     bool half = false;  // density as 16-bit floats
     std::optional<BitPlaneView> hum, act, cld;
     Placement cells;  // of the bit planes; must agree with density's placement and extent / refine
+    // Places each grid by half of its own voxel towards -x, -y and -z: index (i, j, k) is then the corner of its voxel.
+    bool half_voxel_shift = false;
     // Writes the wind by height, one velocity a level of voxels, as a grid of this name, whose voxels are velocity_voxel() of
     // those of the density; needs density.
     std::vector<Velocity> wind;
@@ -104,7 +106,7 @@ struct VdbContent {
 // 2^24, in blocks of 8 x 8 x 8.
 int velocity_voxel(const Extent& voxels);
 
-// Returns the most memory, in bytes, that such a grid takes over so many voxels in blocks.
+// Returns the most memory, in bytes, that such a grid takes over so many voxels, those of whole blocks of 8 x 8 x 8 counted.
 double velocity_bytes(double voxels);
 
 // Writes atomically (atomic_file.h): the file is complete or absent. Throws Error(usage) when the content

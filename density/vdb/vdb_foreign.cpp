@@ -43,10 +43,11 @@ Affine affine_of(const ForeignGrid& foreign) {
         return foreign.y_up ? Vec3d(m.x(), -m.z(), m.y()) : m;
     };
     Affine affine;
-    const Vec3d zero = transform.indexToWorld(Vec3d(0.0));
-    affine.shift = to_ours(zero);
-    const Vec3d units[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    for (std::size_t c = 0; c < 3; ++c) affine.columns[c] = to_ours(transform.indexToWorld(units[c]) - zero);
+    // As the file has it: differences of places would lose the digits that the shift takes.
+    const openvdb::Mat4d matrix = transform.baseMap()->getAffineMap()->getMat4();  // of row vectors
+    const auto row = [&](int n) { return to_ours(Vec3d(matrix(n, 0), matrix(n, 1), matrix(n, 2))); };
+    for (int c = 0; c < 3; ++c) affine.columns[std::size_t(c)] = row(c);
+    affine.shift = row(3);
     for (const Vec3d& v : {affine.columns[0], affine.columns[1], affine.columns[2], affine.shift}) {
         if (!std::isfinite(v.x()) || !std::isfinite(v.y()) || !std::isfinite(v.z())) {
             throw std::runtime_error("its transform has values that are not finite");
@@ -83,6 +84,7 @@ bool axis_map_of(const Affine& affine, AxisMap& map) {
             std::pow(std::max({std::abs(column[0]), std::abs(column[1]), std::abs(column[2])}), 2);
         if (rest > kTolerance * kTolerance * map.edge * map.edge) return false;
     }
+    map.edge = std::abs(affine.columns[std::size_t(map.axis[0])][0]);  // a length is rounded
     return taken[0] && taken[1] && taken[2];
 }
 

@@ -45,7 +45,13 @@ std::vector<WindLevel> wind_levels(const std::string& text) {
 
 }  // namespace
 
-openvdb::MetaMap to_meta_map(const VdbMetadata& metadata, Extent voxels, int refine) {
+void insert_box(openvdb::MetaMap& map, Extent voxels, int refine) {
+    map.insertMeta(kMetaRefine, openvdb::Int32Metadata(refine));
+    map.insertMeta(kMetaBoxMin, openvdb::Vec3IMetadata({0, 0, 0}));
+    map.insertMeta(kMetaBoxMax, openvdb::Vec3IMetadata({voxels.x - 1, voxels.y - 1, voxels.z - 1}));
+}
+
+openvdb::MetaMap to_meta_map(const VdbMetadata& metadata) {
     openvdb::MetaMap map;
     map.insertMeta(kMetaUnits, openvdb::StringMetadata("m"));
     map.insertMeta(kMetaUpAxis, openvdb::StringMetadata("z"));
@@ -60,9 +66,6 @@ openvdb::MetaMap to_meta_map(const VdbMetadata& metadata, Extent voxels, int ref
     map.insertMeta(kMetaStateHash, openvdb::StringMetadata(metadata.state_hash));
     map.insertMeta(kMetaVersion, openvdb::StringMetadata(metadata.nephos_version));
     map.insertMeta(kMetaStreamVersion, openvdb::Int32Metadata(metadata.random_stream_version));
-    map.insertMeta(kMetaRefine, openvdb::Int32Metadata(refine));
-    map.insertMeta(kMetaBoxMin, openvdb::Vec3IMetadata({0, 0, 0}));
-    map.insertMeta(kMetaBoxMax, openvdb::Vec3IMetadata({voxels.x - 1, voxels.y - 1, voxels.z - 1}));
     const Vec3& period = metadata.period_m;
     map.insertMeta(kMetaPeriod, openvdb::Vec3DMetadata({period.x, period.y, period.z}));
     if (!metadata.wind.empty()) map.insertMeta(kMetaWind, openvdb::StringMetadata(wind_text(metadata.wind)));

@@ -40,7 +40,11 @@ inline constexpr const char* kMetaStart = "nephos_start_utc";
 inline constexpr const char* kMetaUtc = "nephos_utc";
 inline constexpr const char* kMetaEcef = "nephos_ecef_from_world";
 
-openvdb::MetaMap to_meta_map(const VdbMetadata& metadata, Extent voxels, int refine);
+// Returns what all grids of a file have.
+openvdb::MetaMap to_meta_map(const VdbMetadata& metadata);
+
+// Inserts the bounds of a grid's voxels, and how many of them are a cell along each axis.
+void insert_box(openvdb::MetaMap& map, Extent voxels, int refine);
 
 // Returns nullopt when nephos did not write `map`; fields that are missing or of another type have their
 // defaults.

@@ -33,12 +33,13 @@ class CheckedArchive : public openvdb::io::Archive {
     }
 };
 
-// Geometry that all grids of a file share.
+// Geometry of a grid: all of a file share it, but for that of the wind over large boxes.
 struct GridGeometry {
     Extent voxels;
     int refine = 1;       // voxels per cell and axis
     Placement placement;  // of the voxels
-    openvdb::math::Transform::Ptr transform;
+    double shift_voxels = 0;  // of the file's places to those, along each axis
+    int coarser = 1;          // edge of the voxels, in those of density
 };
 
 void check_plane(const std::optional<BitPlaneView>& plane, std::optional<Extent>& cells) {
@@ -57,11 +58,11 @@ int refinement(Extent voxels, Extent cells) {
     return refine;
 }
 
-openvdb::math::Transform::Ptr transform_of(const Placement& voxels) {
-    const double size = voxels.cell_size_m;
-    const Vec3 o = voxels.origin_m;
+openvdb::math::Transform::Ptr transform_of(const GridGeometry& geometry) {
+    const double size = geometry.placement.cell_size_m, centre = size * (0.5 + geometry.shift_voxels);
+    const Vec3 o = geometry.placement.origin_m;
     const auto transform = openvdb::math::Transform::createLinearTransform(size);
-    transform->postTranslate({o.x + size / 2, o.y + size / 2, o.z + size / 2});
+    transform->postTranslate({o.x + centre, o.y + centre, o.z + centre});
     return transform;
 }
 
@@ -89,18 +90,19 @@ GridGeometry geometry_of(const VdbContent& content) {
         if (ratio >= 1 && std::abs(ratio - std::round(ratio)) < 1e-9)
             geometry.refine = int(std::round(ratio));
     }
-    geometry.transform = transform_of(geometry.placement);
+    if (content.half_voxel_shift) geometry.shift_voxels = -0.5;
     return geometry;
 }
 
 void describe(openvdb::GridBase& grid, const char* name, const GridGeometry& geometry,
               const openvdb::MetaMap& metadata) {
     grid.setName(name);
-    grid.setTransform(geometry.transform->copy());
+    grid.setTransform(transform_of(geometry));
     grid.setIsInWorldSpace(false);
     for (auto entry = metadata.beginMeta(); entry != metadata.endMeta(); ++entry) {
         grid.insertMeta(entry->first, *entry->second);
     }
+    insert_box(grid, geometry.voxels, geometry.refine);
 }
 
 // Transposes an 8x8 matrix of bits: bit n of byte m becomes bit m of byte n.
@@ -178,7 +180,9 @@ GridGeometry geometry_of_wind(const GridGeometry& density) {
     const auto fewer = [&](int n) { return (n + edge - 1) / edge; };
     wind.voxels = {fewer(density.voxels.x), fewer(density.voxels.y), fewer(density.voxels.z)};
     wind.placement.cell_size_m *= edge;
-    wind.transform = transform_of(wind.placement);
+    wind.coarser = edge;
+    // Of coarser voxels there are fewer to a cell, or a cell is less than one of them.
+    wind.refine = density.refine % edge == 0 ? density.refine / edge : 1;
     return wind;
 }
 
@@ -200,8 +204,7 @@ VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& den
                               const GridGeometry& geometry) {
     if (content.wind.size() != std::size_t(density.voxels.z))
         throw Error(ErrorCode::usage, "a VDB file needs one velocity of the wind a level of voxels");
-    const std::vector<openvdb::Vec3s> profile =
-        profile_of(content.wind, velocity_voxel(density.voxels), geometry.voxels.z);
+    const std::vector<openvdb::Vec3s> profile = profile_of(content.wind, geometry.coarser, geometry.voxels.z);
     auto grid = VectorGrid::create(openvdb::Vec3s(0.0f));
     grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
     openvdb::tree::ValueAccessor<VectorTree> accessor(grid->tree());
@@ -318,9 +321,10 @@ void write_file(const std::filesystem::path& temporary, const std::filesystem::p
     }
 }
 
-}  // namespace
-
+// Of a grid of the wind: 2^24 voxels.
 constexpr double kMostVelocityBlocks = 32768;
+
+}  // namespace
 
 int velocity_voxel(const Extent& voxels) {
     const auto blocks = [&](int edge) {
@@ -340,7 +344,8 @@ double velocity_bytes(double voxels) {
 void write_vdb(const std::filesystem::path& path, const VdbContent& content, const VdbMetadata& metadata) {
     openvdb::initialize();
     const GridGeometry geometry = geometry_of(content);
-    const openvdb::MetaMap meta = to_meta_map(metadata, geometry.voxels, geometry.refine);
+    openvdb::MetaMap meta = to_meta_map(metadata);
+    insert_box(meta, geometry.voxels, geometry.refine);
     const auto grids = make_grids(content, geometry, meta);
     const PublishCheck check(content.publish_check);
     write_atomically(

@@ -90,7 +90,4 @@ bool is_of_file(const std::filesystem::path& path, const Error& error);
 // no sidecar. That of a complete export of volumes must be there.
 std::optional<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list);
 
-// Returns the grid half a voxel towards -x, -y and -z, sharing its voxels.
-DensityGrid shifted_by_half_a_voxel(const DensityGrid& density);
-
 }  // namespace nephos

@@ -41,11 +41,11 @@ DensityGrid grid_of(const DensityGrid& density, int factor) {
 
 void write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s,
                     const LoadedDensity& loaded, double time_s) {
-    DensityGrid density = grid_of(loaded.density, s.layout.factor);
+    const DensityGrid density = grid_of(loaded.density, s.layout.factor);
     VdbContent content;
     VdbMetadata metadata = loaded.metadata.value_or(VdbMetadata{});
     if (!loaded.metadata) metadata.nephos_version = version();
-    if (options.half_voxel_shift) density = shifted_by_half_a_voxel(density);
+    content.half_voxel_shift = options.half_voxel_shift;
     content.density = &density;
     // Of coarser voxels there are fewer to a cell, or a cell is less than one of them.
     const int factor = s.layout.factor, refine = loaded.refine % factor == 0 ? loaded.refine / factor : 1;
@@ -55,15 +55,13 @@ void write_vdb_file(const std::filesystem::path& path, const ExportOptions& opti
     if (!options.velocity_name.empty() && (!metadata.wind.empty() || !s.wind_fields.empty())) {
         Wind wind;
         if (!metadata.wind.empty()) wind.keyframes.push_back({0, metadata.wind});
-        const Placement& at = loaded.density.placement();
-        const Vec3 shift = at.origin_m - density.placement().origin_m;
+        const Placement& at = density.placement();
         if (!s.wind_fields.empty())
-            content.wind_field = [&s, shift, time_s](const Vec3& place_m) {
-                return velocity_of(s.wind_fields, place_m + shift, time_s);
+            content.wind_field = [&s, time_s](const Vec3& place_m) {
+                return velocity_of(s.wind_fields, place_m, time_s);
             };
         for (int k = 0; k < density.extent().z; ++k)
-            content.wind.push_back(
-                wind_at(wind, at.origin_m.z + (k + 0.5) * density.placement().cell_size_m, 0));
+            content.wind.push_back(wind_at(wind, at.origin_m.z + (k + 0.5) * at.cell_size_m, 0));
         content.wind_name = options.velocity_name;
     }
     write_vdb(path, content, metadata);
@@ -127,12 +125,6 @@ void require_halves(const ExportOptions& options, const ExportSequence& s, const
 }
 
 }  // namespace
-
-DensityGrid shifted_by_half_a_voxel(const DensityGrid& density) {
-    Placement placement = density.placement();
-    for (int a = 0; a < 3; ++a) placement.origin_m[a] -= placement.cell_size_m / 2;
-    return placed_at(density, placement);
-}
 
 ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& frame,
                                    const LoadedDensity& loaded) const {
@@ -218,11 +210,13 @@ void FrameExporter::write_dense(const std::filesystem::path& path, ExportFormat 
 // Each frame takes its grid, its voxels as floats, those of the box with its levels as floats, and their codes.
 std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& s) {
     constexpr std::uint64_t kMemory = std::uint64_t(256) << 20;
+    constexpr int kLeafEdge = 8;  // of OpenVDB
     const std::size_t threads =
         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     if (threads <= 1) return 1;
     std::uint64_t voxels = 1, floats = 0, codes = 0;
-    for (const int side : {s.extent.x, s.extent.y, s.extent.z}) voxels *= std::uint64_t(side);
+    for (const int side : {s.extent.x, s.extent.y, s.extent.z})
+        voxels *= std::uint64_t(side + kLeafEdge - 1) / kLeafEdge * kLeafEdge;
     for (const ExportFormat format : all_formats(options)) {
         if (!is_dense(format) && format != ExportFormat::flightgear) continue;
         if (is_dense(format)) codes += dense_bytes(options, s, format);

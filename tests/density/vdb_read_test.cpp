@@ -117,6 +117,30 @@ TEST(VdbRead, ForeignVoxelsKeepValuesAndPlace) {
     EXPECT_NEAR(placement.origin_m.z, corner.z(), 1e-9);
 }
 
+// Voxels of no binary size, the first of them far from the origin: what is written of them lies at the same place again.
+TEST(VdbRead, PlacesKeepEveryDigit) {
+    const TemporaryFolder folder;
+    for (const double size : {0.05, 0.1, 0.3, 30.48}) {
+        for (const int first : {-3000, -64, 150}) {
+            const auto grid = FloatGrid::create(0.0f);
+            grid->setName("density");
+            grid->setTransform(openvdb::math::Transform::createLinearTransform(size));
+            grid->fill(CoordBBox::createCube({first, first + 3, first - 1}, 8), 0.5f);
+            write_with_openvdb(folder / "fog.vdb", {grid});
+            const DensityGrid fog = load_density(folder / "fog.vdb").density;
+            EXPECT_EQ(fog.placement().cell_size_m, size);
+            VdbContent content;
+            content.density = &fog;
+            write_vdb(folder / "own.vdb", content, {});
+            const Placement again = load_density(folder / "own.vdb").density.placement();
+            EXPECT_EQ(again.cell_size_m, size) << first;
+            for (int a = 0; a < 3; ++a)
+                EXPECT_NEAR(again.origin_m[a], fog.placement().origin_m[a],
+                            1e-15 * std::abs(fog.placement().origin_m[a]));
+        }
+    }
+}
+
 TEST(VdbRead, YUpFilesArePermuted) {
     const TemporaryFolder folder;
     const auto grid = foreign_fog();

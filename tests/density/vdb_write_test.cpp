@@ -216,12 +216,19 @@ TEST(VdbWrite, TheWindOfALargeBoxHasLargerVoxels) {
         const auto vel = file.get<openvdb::Vec3SGrid>("vel");
         EXPECT_EQ(vel->voxelSize(), openvdb::Vec3d(200));
         EXPECT_EQ(vel->evalActiveVoxelBoundingBox(), openvdb::CoordBBox({0, 0, 0}, {999, 749, 9}));
+        EXPECT_EQ(vel->metaValue<openvdb::Vec3i>("nephos_bbox_max"), openvdb::Vec3i(999, 749, 9));
+        EXPECT_EQ(file.get<openvdb::FloatGrid>("density")->metaValue<openvdb::Vec3i>("nephos_bbox_max"),
+                  openvdb::Vec3i(3999, 2999, 36));
+        EXPECT_EQ(vel->indexToWorld(openvdb::Coord(0, 0, 0)),
+                  content.half_voxel_shift ? openvdb::Vec3d(100, 200, 300) : openvdb::Vec3d(200, 300, 400))
+            << "half of its own voxel";
         EXPECT_LT(vel->memUsage(), std::uint64_t(210) << 20);
         return [vel](const openvdb::Coord& at) { return vel->getConstAccessor().getValue(at); };
     };
     const auto profile = voxel_of("profile.vdb");
     EXPECT_EQ(profile({7, 9, 2}), openvdb::Vec3s(0.5f * 9.5f, -7, 0));
     EXPECT_EQ(profile({999, 749, 9}), openvdb::Vec3s(0.5f * 36, 0, 0));
+    content.half_voxel_shift = true;
     content.wind_field = [](const Vec3& at) { return Vec3(at.x, at.y, at.z); };
     const auto field = voxel_of("field.vdb");
     EXPECT_EQ(field({7, 9, 2}),

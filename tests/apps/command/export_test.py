@@ -212,6 +212,19 @@ class Export(Case):
                 self.call("export", f"place{number}", *more, "-o", out)
                 self.call("verify", out)
         self.assertIn("another place", self.moved(next((self.folder / "x27").glob("*.vdb"))))
+        # Volumes of other programs, whose first voxel is far from the origin.
+        import numpy
+        import pyopenvdb
+        for number, (first, size) in enumerate(((-64, 0.1), (150, 0.05), (-3000, 0.3), (37, 30.48))):
+            grid = pyopenvdb.FloatGrid()
+            grid.copyFromArray(numpy.full((8, 8, 8), 0.5, "f4"), ijk=(first, first + 3, first - 1))
+            grid.name, grid.gridClass = "density", pyopenvdb.GridClass.FOG_VOLUME
+            grid.transform = pyopenvdb.createLinearTransform(size)
+            pyopenvdb.write(str(self.folder / f"fog{number}.vdb"), [grid])
+            for more in (["--for", "blender"], ["--to", "vdb"], ["--to", "vdb", "--voxel", str(2 * size)]):
+                out = f"fog{number}{more[-1]}"
+                self.call("export", f"fog{number}.vdb", *more, "-o", out)
+                self.call("verify", out)
 
     def moved(self, path):
         """What verify says of an export whose grid lies a thousandth of a voxel elsewhere."""
