@@ -249,9 +249,10 @@ int loop(Editor& editor, Report& report) {
         last_frame = Clock::now();
         if (scripted && script.is_active()) script.apply(editor);
         for (std::filesystem::path& path : editor.window->take_dropped()) dropped.push_back(std::move(path));
-        if (!dropped.empty() && !press_enter_in_field() && !is_refusal_unseen(editor)) {  // likewise
-            for (const std::filesystem::path& path : dropped) ask_before(editor, Pending::open, path);
-            dropped.clear();
+        if (!dropped.empty() && !press_enter_in_field()) {  // likewise
+            const std::vector<std::filesystem::path> paths = std::exchange(dropped, {});
+            if (!is_refusal_unseen(editor))  // else they can be dropped once more
+                for (const std::filesystem::path& path : paths) ask_before(editor, Pending::open, path);
         }
         finish_field_first();
         ImGui::NewFrame();

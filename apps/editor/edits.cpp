@@ -74,6 +74,13 @@ void set_values(Editor& editor, const TextPath& table, const std::vector<TextEnt
         }
         return text;
     };
+    if (is_kept_from_recording(editor, path)) {
+        return say(editor,
+                   entries.front().second + " of " + name +
+                       " is not recorded while the text has problems: mend them, or switch \"Record as key "
+                       "frames\" off",
+                   true);
+    }
     bool recorded = false;
     if (is_recorded(editor, path) && !editor.document->has_syntax_error()) {
         const bool tried =

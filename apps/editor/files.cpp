@@ -7,6 +7,7 @@
 
 #include <imgui.h>
 
+#include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
 #include "core/error.h"
 #include "core/paths.h"
@@ -160,7 +161,8 @@ void file_button(Editor& editor, const std::string& name, const std::string& ext
 }
 
 void offer_grid(Editor& editor, const fs::path& path) {
-    const bool layers = editor.document->scene() && !editor.document->scene()->layers.empty();
+    const Node* const list = value_node(editor.document->values(), text_path("layer"));
+    const bool layers = list != nullptr && !list->items.empty();
     const std::string key = layers ? "layer[0].lattice.initial_state" : "lattice.initial_state";
     editor.question = {
         path.filename().string() +

@@ -21,17 +21,18 @@ constexpr std::size_t kMostSketched = 220;     // billboards of a sketch; of mor
 constexpr std::size_t kMostKeptSeeds = 2'000;  // of a cloud that becomes a base model
 const Vec3 kSketchSun{-0.5, -0.55, 0.67};      // towards it: from the left, behind the one who looks north
 
-// The index in Scene::models of the base model that is selected; nothing where none is.
+// The index in Scene::models of the base model that is selected; nothing where none is, and while the text has problems.
 std::optional<std::size_t> selected_model(const Editor& editor) {
-    const std::optional<Scene>& scene = editor.document->scene();
-    if (!scene || editor.selected.size() < 2 || editor.selected[0].name != "model") return std::nullopt;
+    const Scene* const scene = editor.document->current_scene();
+    if (scene == nullptr || editor.selected.size() < 2 || editor.selected[0].name != "model")
+        return std::nullopt;
     const std::size_t index = editor.selected[1].index + models_from_files(editor);
     return index < scene->models.size() ? std::optional(index) : std::nullopt;
 }
 
 // Whether twenty of its clouds are made within a frame of the window; their light takes the square of the boxes.
 bool is_quick(const Editor& editor, std::size_t model) {
-    return largest_cloud(editor.document->scene()->models[model]) <= kMostBoxes;
+    return largest_cloud(editor.document->current_scene()->models[model]) <= kMostBoxes;
 }
 
 GeneratedCloud generated(const Scene& scene, std::size_t model, std::uint32_t number) {
@@ -52,7 +53,7 @@ const std::vector<GeneratedCloud>& clouds_of(const Editor& editor, Generation::M
     if (known && made.clouds.size() == count) return made.clouds;
     made = {version, model, first, {}};
     for (std::uint32_t n = 0; n < count; ++n)
-        made.clouds.push_back(generated(*editor.document->scene(), model, first + n));
+        made.clouds.push_back(generated(*editor.document->current_scene(), model, first + n));
     return made.clouds;
 }
 
@@ -152,7 +153,7 @@ void keep_as_model(Editor& editor, std::size_t model, const GeneratedCloud& clou
                    true);
     }
     const std::size_t index = editor.selected[1].index;
-    const BaseModel& from = editor.document->scene()->models[model];
+    const BaseModel& from = editor.document->current_scene()->models[model];
     std::string seeds = "[";
     for (const SeedBox& box : cloud.cloud.boxes)
         seeds += (seeds.size() > 1 ? ", " : "") + seed_toml(box, from.seeds[box.seed]);
@@ -189,8 +190,9 @@ void generation_row(Editor& editor) {
     if (!model || editor.selected.size() != 2) return;
     Generation& generation = editor.generation;
     if (!is_quick(editor, *model)) {
-        ImGui::TextDisabled("Its clouds have up to %lld boxes: too many to be shown here.",
-                            static_cast<long long>(largest_cloud(editor.document->scene()->models[*model])));
+        ImGui::TextDisabled(
+            "Its clouds have up to %lld boxes: too many to be shown here.",
+            static_cast<long long>(largest_cloud(editor.document->current_scene()->models[*model])));
         return;
     }
     if (button(editor, "Generate again", "The next cloud that this model makes, as boxes over the picture")) {
@@ -225,7 +227,8 @@ void generation_window(Editor& editor) {
     const ImVec2 room = ImGui::GetIO().DisplaySize;
     ImGui::SetNextWindowSize(ImVec2(std::min(52 * em, 0.95f * room.x), std::min(37 * em, 0.9f * room.y)),
                              ImGuiCond_Appearing);
-    const std::string title = "Clouds of " + editor.document->scene()->models[*model].name + "###generation";
+    const std::string title =
+        "Clouds of " + editor.document->current_scene()->models[*model].name + "###generation";
     if (ImGui::Begin(title.c_str(), &generation.shows_grid,
                      ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoCollapse)) {
         const std::vector<GeneratedCloud>& clouds =

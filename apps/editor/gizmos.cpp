@@ -146,7 +146,7 @@ void root_gizmo(Editor& editor, const TextPath& path, const Root& root, const Ve
 // The seeds of a model, in its own space about the camera's target, and the roots of the chosen one.
 void model_gizmo(Editor& editor) {
     const TextPath model(editor.selected.begin(), editor.selected.begin() + 2);
-    const Scene scene = *editor.document->scene();  // a handle replaces it
+    const Scene scene = *editor.document->current_scene();  // a handle replaces it
     const std::size_t index = editor.selected[1].index + models_from_files(editor);
     if (index >= scene.models.size()) return;
     const Vec3 origin = editor.camera.camera.target_m;
@@ -180,7 +180,8 @@ void model_gizmo(Editor& editor) {
 
 // Rain areas that were placed by hand, as ellipses below the clouds.
 void placed_rain(Editor& editor, std::size_t layer, const LayerOptions& options) {
-    const double ground = editor.document->scene()->render.ground.height_m, base = options.base_height_m.min;
+    const double ground = editor.document->current_scene()->render.ground.height_m,
+                 base = options.base_height_m.min;
     const bool in_rain = editor.selected.size() >= 5 && editor.selected[2].name == "rain" &&
                          editor.selected[3].name == "placed";
     for (std::size_t n = 0; n < options.rain.placed.size(); ++n) {
@@ -238,10 +239,8 @@ void scatter_gizmo(Editor& editor, const TextPath& path, const EllipsoidScatter&
 
 bool gizmos(Editor& editor) {
     let_go_of_handles(editor);
-    const std::optional<Scene>& now = editor.document->scene();
-    // While the text has problems the scene is that of an earlier one, whose elements may stand elsewhere in this one.
-    const bool is_of_text = now && editor.document->problems().empty();
-    if (!editor.show_gizmos || !is_of_text || editor.selected.empty()) return false;
+    const Scene* const now = editor.document->current_scene();
+    if (!editor.show_gizmos || now == nullptr || editor.selected.empty()) return false;
     const std::string& section = editor.selected.front().name;
     if (section == "model" && editor.selected.size() >= 2) {
         model_gizmo(editor);

@@ -63,9 +63,9 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
     ImGui::InvisibleButton("key frames", ImVec2(std::max(width, 1.0f), height));
     editor.controls.note("key frames");
     const bool hovered = ImGui::IsItemHovered();
-    const std::optional<Scene>& scene = editor.document->scene();
-    if (!scene) return;
-    const double step_s = scene->automaton.time_step_s, span = double(std::max<std::uint64_t>(last_step, 1));
+    if (!editor.shown_scene) return;
+    const double step_s = editor.shown_scene->automaton.time_step_s,
+                 span = double(std::max<std::uint64_t>(last_step, 1));
     // As the slider's grab: a step's middle lies within its rim.
     const float rim = 0.5f * ImGui::GetStyle().GrabMinSize + 2;
     const auto x_of = [&](double step) {
@@ -88,7 +88,9 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
         if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) go_to(editor, step);
     }
     static TextPath held;  // one mouse
-    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) held.clear();
+    const Scene* const scene = editor.document->current_scene();
+    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || scene == nullptr) held.clear();
+    if (scene == nullptr) return;
     for (const KeyMark& mark : marks_of(*scene)) {
         const double step = mark.time_s / step_s;
         const float x = x_of(step);

@@ -42,15 +42,55 @@ std::vector<WindLevel> profile_at(const Wind& wind, double time_s) {
     return out;
 }
 
-// The text with key frames of a wind at a path ("wind", "layer[0].wind") replaced.
-std::string with_keyframes(std::string text, const TextPath& path, const std::vector<WindKeyframe>& keys) {
-    text = without(text, path);
-    for (const WindKeyframe& key : keys) {
-        text = with_new_element(
-            text, path,
-            std::vector<TextEntry>{{"time_s", number_text(key.time_s)}, {"levels", levels_toml(key.levels)}});
+// A key frame as a text has it: its time, and its other keys.
+struct KeyFrame {
+    double time_s = 0;
+    std::vector<TextEntry> entries;
+};
+
+// Returns the text with other key frames at a path ("wind", "layer[0].wind", "sun.path"); `before`: those that it has. Both rise in
+// time. What stays of them is not touched, nor what their author wrote beside it.
+std::string with_key_frames(std::string text, const TextPath& path, const std::vector<KeyFrame>& before,
+                            const std::vector<KeyFrame>& after) {
+    const auto element = [&](std::size_t n) {
+        TextPath out = path;
+        out.push_back({{}, n});
+        return out;
+    };
+    const auto key_of = [&](std::size_t n, const std::string& name) {
+        TextPath out = element(n);
+        out.push_back({name, 0});
+        return out;
+    };
+    // From the last to the first: the places of those before stay.
+    for (std::size_t old = before.size(), now = after.size(); old > 0 || now > 0;) {
+        const bool is_removed = now == 0 || (old > 0 && before[old - 1].time_s > after[now - 1].time_s);
+        if (is_removed) {
+            text = without(text, element(--old));
+            continue;
+        }
+        const KeyFrame& wanted = after[--now];
+        if (old == 0 || before[old - 1].time_s < wanted.time_s) {
+            std::vector<TextEntry> entries{{"time_s", number_text(wanted.time_s)}};
+            entries.insert(entries.end(), wanted.entries.begin(), wanted.entries.end());
+            text = with_new_element(text, path, entries, old);
+            continue;
+        }
+        const std::vector<TextEntry>& was = before[--old].entries;
+        for (const TextEntry& entry : wanted.entries)
+            if (std::ranges::count(was, entry) == 0)
+                text = with_value(text, key_of(old, entry.first), entry.second);
+        for (const TextEntry& entry : was)
+            if (std::ranges::count(wanted.entries, entry.first, &TextEntry::first) == 0)
+                text = without(text, key_of(old, entry.first));
     }
     return text;
+}
+
+std::vector<KeyFrame> key_frames(const std::vector<WindKeyframe>& keys) {
+    std::vector<KeyFrame> out;
+    for (const WindKeyframe& key : keys) out.push_back({key.time_s, {{"levels", levels_toml(key.levels)}}});
+    return out;
 }
 
 // Key frames of a wind that is `before` up to the step before `step` and `after` from it on. Between two key frames of
@@ -127,34 +167,24 @@ std::vector<SunKey> sun_with_key(const Scene& scene, SunKey wanted, std::uint64_
     return keys;
 }
 
-// The text with other key frames of the sun; those that stay are not touched, nor what their author wrote beside them.
+std::vector<KeyFrame> key_frames(const std::vector<SunKey>& keys, const Rgb& colour) {
+    std::vector<KeyFrame> out;
+    for (const SunKey& key : keys) {
+        std::vector<TextEntry> entries{{"elevation_deg", number_text(key.elevation_deg)},
+                                       {"azimuth_deg", number_text(key.azimuth_deg)}};
+        if (key.colour != colour) entries.emplace_back("colour", colour_toml(key.colour));
+        out.push_back({key.time_s, std::move(entries)});
+    }
+    return out;
+}
+
+// The text with other key frames of the sun, which then follows no date.
 std::string with_sun_keys(std::string text, const Scene& scene, const std::vector<SunKey>& keys) {
     for (const char* key : {"sun.date", "sun.time", "sun.moves", "sun.latitude_deg", "sun.longitude_deg"})
         text = without(text, text_path(key));
-    const TextPath path = text_path("sun.path");
-    const std::vector<SunKey>& before = scene.sun_path;
-    const std::size_t shorter = std::min(keys.size(), before.size());
-    std::size_t same = 0, behind = 0;  // that stay, before the others and behind them
-    while (same < shorter && keys[same] == before[same]) ++same;
-    while (same > 0 && behind < shorter - same &&
-           keys[keys.size() - 1 - behind] == before[before.size() - 1 - behind])
-        ++behind;
-    if (same == 0) {
-        text = without(text, path);
-    } else {
-        for (std::size_t n = before.size() - behind; n-- > same;)
-            text = without(text, text_path("sun.path[" + std::to_string(n) + "]"));
-    }
-    for (std::size_t n = same; n < keys.size() - behind; ++n) {
-        std::vector<TextEntry> entries{{"time_s", number_text(keys[n].time_s)},
-                                       {"elevation_deg", number_text(keys[n].elevation_deg)},
-                                       {"azimuth_deg", number_text(keys[n].azimuth_deg)}};
-        if (keys[n].colour != scene.render.sun.colour)
-            entries.emplace_back("colour", colour_toml(keys[n].colour));
-        text =
-            behind > 0 ? with_new_element(text, path, entries, n - 1) : with_new_element(text, path, entries);
-    }
-    return text;
+    const Rgb& colour = scene.render.sun.colour;
+    return with_key_frames(text, text_path("sun.path"), key_frames(scene.sun_path, colour),
+                           key_frames(keys, colour));
 }
 
 // The step of the picture that is shown: what it shows is decided by the newest change.
@@ -162,7 +192,7 @@ std::uint64_t shown_step(const Editor& editor) { return editor.picture ? editor.
 
 std::string with_recorded_sun(const Editor& editor, const std::string& text, const SunKey& wanted,
                               std::uint64_t step) {
-    const Scene& scene = *editor.shown_scene;
+    const Scene& scene = *editor.document->current_scene();
     const bool adds_one = !editor.record && !scene.sun_path.empty();
     return with_sun_keys(text, scene,
                          adds_one ? sun_with_key(scene, wanted, step) : changed_sun(scene, wanted, step));
@@ -182,8 +212,9 @@ void record_sun(Editor& editor, const SunKey& wanted) {
 void apply(Editor& editor, const std::string& text, const std::string& what, const std::string& merge) {
     editor.document->edit(text, what, merge);
     editor.shown_version = editor.document->version();
-    if (!editor.document->problems().empty() || !editor.document->scene()) return;
-    editor.shown_scene = *editor.document->scene();
+    const Scene* const scene = editor.document->current_scene();
+    if (scene == nullptr) return;
+    editor.shown_scene = *scene;
     editor.live->change(*editor.shown_scene);
 }
 
@@ -227,34 +258,46 @@ TextPath wind_array(const TextPath& path) {
     return {path.begin(), path.begin() + std::ptrdiff_t(wind_length(path))};
 }
 
-// Key frames of a wind with the one at `path` as in the text `edited` from a step on; nothing where that has problems.
-std::optional<std::vector<WindKeyframe>> recorded_keys(const Editor& editor, const TextPath& path,
-                                                       const std::string& edited, std::uint64_t from) {
+// The text with the wind at `path` as in the text `edited` from a step on, and its number of key frames.
+struct RecordedWind {
+    std::string text;
+    std::size_t keys = 0;
+};
+
+// Returns nothing where the text `edited` has problems.
+std::optional<RecordedWind> with_recorded_wind(const Editor& editor, const TextPath& path,
+                                               const std::string& edited, std::uint64_t from) {
     const std::optional<Scene> wanted = scene_of(editor, edited);
     if (!wanted) return std::nullopt;
     const TextPath array = wind_array(path);
     const std::size_t index = path[array.size()].index;
     const Wind& changed = wind_at_path(*wanted, array);
     if (index >= changed.keyframes.size()) return std::nullopt;
-    const Scene& before = *editor.shown_scene;
-    return changed_keys(wind_at_path(before, array), changed.keyframes[index].levels, from,
-                        before.automaton.time_step_s);
+    const Scene& scene = *editor.document->current_scene();
+    const Wind& before = wind_at_path(scene, array);
+    const std::vector<WindKeyframe> keys =
+        changed_keys(before, changed.keyframes[index].levels, from, scene.automaton.time_step_s);
+    return RecordedWind{
+        with_key_frames(editor.document->text(), array, key_frames(before.keyframes), key_frames(keys)),
+        keys.size()};
 }
+
+// Clouds that enter at the end of the present step were placed with the wind that it has there: a change follows it.
+std::uint64_t step_of_change(std::uint64_t steps_taken) { return steps_taken + 1; }
 
 bool record_wind(Editor& editor, const TextPath& path, const std::string& edited) {
     const Held held(*editor.live);
-    // Clouds that enter at the end of the present step were placed with the wind that it has there: the change follows it.
-    const std::uint64_t from = held.step + 1;
-    const auto keys = recorded_keys(editor, path, edited, from);
-    if (!keys) return false;
+    const std::uint64_t from = step_of_change(held.step);
+    const auto recorded = with_recorded_wind(editor, path, edited, from);
+    if (!recorded) return false;
     const TextPath array = wind_array(path);
     say(editor, "Wind recorded from step " + std::to_string(from) + " on");
-    apply(editor, with_keyframes(editor.document->text(), array, *keys),
-          "Wind from step " + std::to_string(from), "live " + std::to_string(held.step));
+    apply(editor, recorded->text, "Wind from step " + std::to_string(from),
+          "live " + std::to_string(held.step));
     // What is shown of the list is now its newest key frame.
     if (editor.selected.size() > array.size() &&
         std::equal(array.begin(), array.end(), editor.selected.begin())) {
-        editor.selected[array.size()].index = keys->size() - 1;
+        editor.selected[array.size()].index = recorded->keys - 1;
     }
     return true;
 }
@@ -274,7 +317,14 @@ std::optional<SunKey> recorded_sun(const Editor& editor, const TextPath& path, c
 }  // namespace
 
 bool is_recorded(const Editor& editor, const TextPath& path) {
-    return editor.record || (is_sun(path) && editor.shown_scene && !editor.shown_scene->sun_path.empty());
+    if (editor.record) return true;
+    // While the text has problems the sun is that of an earlier one: its keys are shown and set as they are.
+    return is_sun(path) && editor.document->current_scene() != nullptr && editor.shown_scene &&
+           !editor.shown_scene->sun_path.empty();
+}
+
+bool is_kept_from_recording(const Editor& editor, const TextPath& path) {
+    return editor.record && (is_sun(path) || is_of_wind(path)) && editor.document->current_scene() == nullptr;
 }
 
 Sun sun_now(const Editor& editor) {
@@ -288,7 +338,9 @@ bool is_recorded_when_left(const Editor& editor, const TextPath& path) {
 
 std::optional<std::string> value_now(const Editor& editor, const TextPath& path) {
     if (editor.recorded_value && editor.recorded_value->path == path) return editor.recorded_value->value;
-    if (!is_sun(path) || !editor.shown_scene || editor.shown_scene->sun_path.empty()) return std::nullopt;
+    if (!is_sun(path) || editor.document->current_scene() == nullptr || !editor.shown_scene ||
+        editor.shown_scene->sun_path.empty())
+        return std::nullopt;
     const Sun sun = sun_now(editor);
     if (path[1].name == "colour") return colour_toml(sun.colour);
     return number_text(path[1].name == "azimuth_deg" ? sun.azimuth_deg : sun.elevation_deg, 6);
@@ -296,7 +348,9 @@ std::optional<std::string> value_now(const Editor& editor, const TextPath& path)
 
 void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dragging) {
     const TextPath sun = text_path("sun");
-    if (!editor.shown_scene || !editor.document->problems().empty()) return;
+    if (!editor.shown_scene) return;
+    if (editor.document->current_scene() == nullptr)
+        return say(editor, "The sun stays while the text has problems: mend them, or undo", true);
     if (is_recorded(editor, text_path("sun.elevation_deg")))
         return record_sun(editor, {0, elevation_deg, azimuth_deg, sun_now(editor).colour});
     if (editor.shown_scene->render.sun.date.empty()) {
@@ -315,7 +369,7 @@ void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dra
 }
 
 bool record_live(Editor& editor, const TextPath& path, const std::string& edited) {
-    if (!editor.shown_scene || !editor.document->problems().empty()) return false;
+    if (!editor.shown_scene || editor.document->current_scene() == nullptr) return false;
     if (is_sun(path)) {
         const std::optional<SunKey> key = recorded_sun(editor, path, edited);
         if (key) record_sun(editor, *key);
@@ -325,21 +379,24 @@ bool record_live(Editor& editor, const TextPath& path, const std::string& edited
 }
 
 std::string with_recorded(const Editor& editor, const TextPath& path, const std::string& edited) {
-    if (!editor.shown_scene || !editor.document->problems().empty()) return edited;
+    if (!editor.shown_scene || editor.document->current_scene() == nullptr) return edited;
     const std::string& text = editor.document->text();
     if (is_sun(path)) {
         const std::optional<SunKey> key = recorded_sun(editor, path, edited);
         return key ? with_recorded_sun(editor, text, *key, shown_step(editor)) : edited;
     }
     if (!is_of_wind(path)) return edited;
-    const auto keys = recorded_keys(editor, path, edited, editor.live->status().step + 1);
-    return keys ? with_keyframes(text, wind_array(path), *keys) : edited;
+    const auto recorded =
+        with_recorded_wind(editor, path, edited, step_of_change(editor.live->status().steps_taken));
+    return recorded ? recorded->text : edited;
 }
 
 void record_climate(Editor& editor, double final_state, double duration_s) {
-    if (!editor.shown_scene || !editor.document->problems().empty()) return;
+    if (!editor.shown_scene) return;
+    if (editor.document->current_scene() == nullptr)
+        return say(editor, "The climate stays while the text has problems: mend them, or undo", true);
     const Held held(*editor.live);
-    const Scene& scene = *editor.shown_scene;
+    const Scene& scene = *editor.document->current_scene();
     const double step_s = scene.automaton.time_step_s, now = double(held.step) * step_s;
     const auto state_at = [&](double time_s) {
         const std::vector<StatePoint>& points = scene.climate.schedule;

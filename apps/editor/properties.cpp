@@ -43,10 +43,15 @@ const Node* default_node(Editor& editor, const Key& key, const TextPath& path) {
     if (known != editor.defaults.end())
         return known->second.kind == Node::Kind::table ? nullptr : &known->second;
     std::string value;
-    if (const std::optional<Scene>& scene = editor.document->scene()) {
-        const TextPath above(path.begin(), path.end() - 1);
-        value = default_value(key, owner_at(*scene, above, models_from_files(editor)));
-    }
+    static const Scene kPlain;
+    const TextPath above(path.begin(), path.end() - 1);
+    // While the text has problems the elements of the last scene may be others.
+    const bool is_in_list =
+        std::ranges::any_of(above, [](const TextStep& step) { return step.name.empty(); });
+    const Scene* scene = editor.document->current_scene();
+    if (scene == nullptr && editor.document->scene())
+        scene = is_in_list ? &kPlain : &*editor.document->scene();
+    if (scene != nullptr) value = default_value(key, owner_at(*scene, above, models_from_files(editor)));
     Node& made = editor.defaults[name];  // a table: it has none
     if (!value.empty()) made = parsed_value(value);
     return made.kind == Node::Kind::table ? nullptr : &made;
@@ -55,9 +60,9 @@ const Node* default_node(Editor& editor, const Key& key, const TextPath& path) {
 // The names of models that the scene has from files; none while the text has problems, as the scene is then of an earlier one.
 std::vector<std::string> names_from_files(const Editor& editor) {
     std::vector<std::string> names;
-    if (!editor.document->problems().empty()) return names;
-    for (std::size_t n = 0; n < models_from_files(editor); ++n)
-        names.push_back(editor.document->scene()->models[n].name);
+    const Scene* const scene = editor.document->current_scene();
+    if (scene == nullptr) return names;
+    for (std::size_t n = 0; n < models_from_files(editor); ++n) names.push_back(scene->models[n].name);
     return names;
 }
 
@@ -306,10 +311,10 @@ void take_typed_value(Editor& editor) {
 }
 
 std::size_t models_from_files(const Editor& editor) {
-    const std::optional<Scene>& scene = editor.document->scene();
+    const Scene* const scene = editor.document->current_scene();
     const Node* own = value_node(editor.document->values(), text_path("model"));
     const std::size_t in_text = own != nullptr ? own->items.size() : 0;
-    return scene && scene->models.size() > in_text ? scene->models.size() - in_text : 0;
+    return scene != nullptr && scene->models.size() > in_text ? scene->models.size() - in_text : 0;
 }
 
 void properties_panel(Editor& editor) {

@@ -17,9 +17,9 @@ namespace fs = std::filesystem;
 void start_run(Editor& editor) {
     auto run = std::make_unique<BackgroundRun>();
     BackgroundRun& state = *run;
-    state.folder = fs::path("out") / editor.document->scene()->name;
-    state.thread = std::thread([&state, scene = *editor.document->scene(),
-                                file = editor.document->path().string()] {
+    const Scene& of_text = *editor.document->current_scene();
+    state.folder = fs::path("out") / of_text.name;
+    state.thread = std::thread([&state, scene = of_text, file = editor.document->path().string()] {
         std::string result, failure;
         try {
             RunSettings settings = run_settings(scene, file);
@@ -64,7 +64,7 @@ void run_window(Editor& editor) {
             "Simulates the whole scene as it stands and writes density grids, pictures and statistics, "
             "as `nephos run` does.");
         ImGui::Spacing();
-        const bool is_sound = editor.document->scene() && editor.document->problems().empty();
+        const bool is_sound = editor.document->current_scene() != nullptr;
         if (!editor.run && !is_sound) {
             ImGui::TextWrapped("The scene has problems: they come first.");
         } else if (!editor.run) {

@@ -40,6 +40,9 @@ class SceneDocument {
     // The last text without problems as a scene; none when there was none.
     const std::optional<Scene>& scene() const { return scene_; }
     const std::vector<Problem>& problems() const { return problems_; }
+    // The scene of the text as it is; null while it has problems. What acts on elements of the text takes this one: those of an
+    // earlier one may stand elsewhere in it.
+    const Scene* current_scene() const { return problems_.empty() && scene_ ? &*scene_ : nullptr; }
     // The text cannot be parsed: values() are those of an earlier one.
     bool has_syntax_error() const { return syntax_error_; }
 

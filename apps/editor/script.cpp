@@ -216,7 +216,10 @@ void Script::begin_line(Editor& editor) {
     if (!line_begun_) line_begin_ = Clock::now();
     if (!line_begun_) found_at_ = ImVec2(-1, -1);
     // Two clicks are one however slow the machine is.
-    ImGui::GetIO().MouseDoubleClickTime = command == "double-click-at" ? 30.0f : 0.3f;
+    ImGuiIO& io = ImGui::GetIO();
+    io.MouseDoubleClickTime = command == "double-click-at" ? 30.0f : 0.3f;
+    if (command == "double-click-at" && !line_begun_)
+        io.MouseClickedTime[0] = -1e9;  // those before are others
     if (!line_begun_) waited_frames_ = 0;
     line_begun_ = true;
     const auto done = [this] {

@@ -299,7 +299,8 @@ void recovery_dialog(Editor& editor);
 // run_window.cpp
 void run_window(Editor& editor);
 
-// properties.cpp: how many base models of the scene come from other files; they stand before those of the text.
+// properties.cpp: how many base models of the scene come from other files; they stand before those of the text. 0 while the text
+// has problems.
 std::size_t models_from_files(const Editor& editor);
 
 // Controls with names; each returns as its ImGui namesake.
@@ -374,6 +375,8 @@ bool record_live(Editor& editor, const TextPath& path, const std::string& edited
 // Returns whether a change of a key is to be recorded: while the user records, and always of a sun with key frames, which
 // stand in the place of the key.
 bool is_recorded(const Editor& editor, const TextPath& path);
+// Returns whether a key would be recorded were it not for problems of the text: it is then not changed at all.
+bool is_kept_from_recording(const Editor& editor, const TextPath& path);
 // Returns the text that record_live() would make now; `edited` for keys that cannot be recorded.
 std::string with_recorded(const Editor& editor, const TextPath& path, const std::string& edited);
 // Returns whether a number that its field changes now is recorded once that is left.

@@ -351,7 +351,7 @@ std::string without(std::string_view text, const TextPath& path) {
 }
 
 std::string with_new_element(std::string_view text, const TextPath& array, std::span<const TextEntry> entries,
-                             std::optional<std::size_t> after) {
+                             std::optional<std::size_t> before) {
     const TomlNode root = toml_tree(text);
     const Reached reached = reach(root, array);
     const std::string newline = newline_of(text);
@@ -366,7 +366,14 @@ std::string with_new_element(std::string_view text, const TextPath& array, std::
     }
     const TomlNode& node = *reached.node;
     if (node.form == Form::sections) {
-        const TomlNode& last = after && *after < node.items.size() ? node.items[*after] : node.items.back();
+        if (before && *before == 0) {
+            std::vector<TextRegion> places;
+            collect_places(node.items.front(), false, places);
+            const std::size_t at = std::ranges::min(places, {}, &TextRegion::begin).begin;
+            return applied(text, {{{at, at}, header + newline + as_lines(entries, newline) + newline}});
+        }
+        const TomlNode& last =
+            before && *before < node.items.size() ? node.items[*before - 1] : node.items.back();
         return applied(text, {new_section(text, end_of_sections(last), header, as_lines(entries, newline))});
     }
     if (node.form != Form::array) refuse(array, "is no array of tables");
@@ -374,9 +381,9 @@ std::string with_new_element(std::string_view text, const TextPath& array, std::
     if (node.items.empty()) {
         return applied(text, {{{node.value.begin + 1, node.value.begin + 1}, element}});
     }
-    const TextRegion last =
-        after && *after < node.items.size() ? node.items[*after].value : node.items.back().value;
-    return applied(text, added_behind(text, last, element));
+    if (before && *before < node.items.size())
+        return applied(text, {added_before(text, node.items[*before].value, element)});
+    return applied(text, added_behind(text, node.items.back().value, element));
 }
 
 std::string with_copied_element(std::string_view text, const TextPath& array, std::size_t index) {

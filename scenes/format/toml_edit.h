@@ -52,10 +52,10 @@ std::string without(std::string_view text, const TextPath& path);
 // A key and its value as TOML.
 using TextEntry = std::pair<std::string, std::string>;
 
-// Adds an element to an array of tables, which is made when it is not there; after all others, or after element
-// `after`. It has the form of the others: [[name]], or within the array's brackets.
+// Adds an element to an array of tables, which is made when it is not there; behind all others, or before element
+// `before` and the comment directly above that. It has the form of the others: [[name]], or within the array's brackets.
 std::string with_new_element(std::string_view text, const TextPath& array, std::span<const TextEntry> entries,
-                             std::optional<std::size_t> after = {});
+                             std::optional<std::size_t> before = {});
 
 // Adds a copy of an element after it.
 std::string with_copied_element(std::string_view text, const TextPath& array, std::size_t index);

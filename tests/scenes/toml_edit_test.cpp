@@ -366,13 +366,29 @@ TEST(TomlEdit, SectionsBelowDottedKeysBelongToTheirTable) {
     EXPECT_EQ(without(one + two, text_path("layer[0].rain")), "[[layer]]\n" + two);
     for (const std::string& more :
          {with_copied_element(one + two, text_path("layer"), 0),
-          with_new_element(one + two, text_path("layer"), std::vector<TextEntry>{{"k", "1"}}, 0)}) {
+          with_new_element(one + two, text_path("layer"), std::vector<TextEntry>{{"k", "1"}}, 1)}) {
         ASSERT_TRUE(is_toml(more)) << more;
         const TomlNode tree = toml_tree(more);
         ASSERT_EQ(find_node(tree, text_path("layer"))->items.size(), 3u) << more;
         EXPECT_NE(find_node(tree, text_path("layer[0].rain.placed[0].x_m")), nullptr) << more;
         EXPECT_EQ(value_at(more, text_path("layer[2].name")), "\"high\"") << more;
     }
+}
+
+TEST(TomlEdit, ElementsAreAddedBeforeOthers) {
+    const std::vector<TextEntry> entries{{"k", "1"}};
+    const std::string sections =
+        "# file\n\n[sun]\nx = 1\n# first\n[[sun.path]]  # a\nk = 2\n\n[[sun.path]]\nk = 3\n";
+    EXPECT_EQ(with_new_element(sections, text_path("sun.path"), entries, 0),
+              "# file\n\n[sun]\nx = 1\n[[sun.path]]\nk = 1\n\n# first\n[[sun.path]]  # a\nk = "
+              "2\n\n[[sun.path]]\nk = 3\n");
+    EXPECT_EQ(with_new_element(sections, text_path("sun.path"), entries, 1),
+              "# file\n\n[sun]\nx = 1\n# first\n[[sun.path]]  # a\nk = 2\n\n[[sun.path]]\nk = "
+              "1\n\n[[sun.path]]\nk = 3\n");
+    EXPECT_EQ(with_new_element("a = [{ k = 2 }, { k = 3 }]\n", text_path("a"), entries, 0),
+              "a = [{ k = 1 }, { k = 2 }, { k = 3 }]\n");
+    EXPECT_EQ(with_new_element("a = [\n  # two\n  { k = 2 }, # b\n]\n", text_path("a"), entries, 0),
+              "a = [\n  # two\n  { k = 1 },\n  { k = 2 }, # b\n]\n");
 }
 
 TEST(TomlEdit, KeysThatAreAddedToDottedOnesKeepTheirQuotes) {

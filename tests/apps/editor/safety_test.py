@@ -990,6 +990,78 @@ class Fields(Kept):
             self.assertIn(expected, scene.read_text(encoding="utf-8"))
 
 
+class Problems(Kept):
+    """While the text has problems the scene is that of an earlier one: nothing is done to elements that stand elsewhere now, nor
+    with values that the text does not have."""
+
+    PROBLEM = 'click field\nclick "new field.grids"\nwait 0.5\nexpect-control problems\n'
+    MENDED = "click field.grids\nclick field.grids[0]\nkey DELETE\nwait 0.5\n"
+    AT_STEP_3 = "wait 0.5\nkey SPACE\nkey HOME\nwait 0.3\nkey .\nkey .\nkey .\nwait 0.5\n"
+    HEAD = "seed = 4\n[lattice]\ncells = [16, 16, 12]\n[time]\nstep_s = 2\nsteps = 40\n"
+    SUN = HEAD + ("[sun]\nelevation_deg = 40\nazimuth_deg = 200\ncolour = [0.1, 0.2, 0.3]\n"
+                  "[[sun.path]] # first\ntime_s = 0\nelevation_deg = 40\nazimuth_deg = 200\n"
+                  "[[sun.path]] # second\ntime_s = 20\nelevation_deg = 39.0\nazimuth_deg = 200\ncolour = [0.9, 0.8, 0.7]\n")
+
+    def saved(self, text, script, **options):
+        scene = self.folder / "p.toml"
+        scene.write_text(text, encoding="utf-8")
+        (self.folder / ".p.toml.autosave").unlink(missing_ok=True)  # of one that failed
+        said = self.edit(scene, script=self.AT_STEP_3 + script + "key CTRL+S\nwait 0.5\n" * (not options), **options)
+        return said if options else scene.read_text(encoding="utf-8")
+
+    def test_there_are_no_marks_and_no_clouds(self):
+        wind = "".join(f"[[wind]]\ntime_s = {time}\nlevels = [{{ height_m = 1000, from_deg = 250, speed_m_per_s = 5 }}]\n" for time in (0, 20, 50))
+        for text, section in ((self.HEAD + wind, "wind"), (self.SUN, "sun")):
+            mark = "wind[1]" if section == "wind" else "sun.path[1]"
+            said = self.saved(text, f'expect-control "key frame {mark}"\n{self.PROBLEM}click "key frame {mark}"\n', status=1)
+            self.assertIn(f"no control 'key frame {mark}'", said)
+        models = self.HEAD + "".join(f'[[model]]\nname = "{name}"\nseeds = [{{ position_m = [0, 0, 200], size_m = [111, 112, 113] }}]\n' for name in "abc")
+        choose = 'click model\nclick model[0]\nclick "tab Properties"\nwait 0.4\n'
+        said = self.saved(models + '[[sky]]\nname = "fair"\nstate = 0\nclouds = 3\nmodels = ["a"]\n'
+                          '[[layer]]\nname = "low"\nskies = ["fair"]\nbase_height_m = 1000\n',
+                          f'{choose}expect-control "20 at once"\n{self.PROBLEM}{choose}click "20 at once"\n', status=1)
+        self.assertIn("no control '20 at once'", said)
+
+    def test_keys_of_a_moving_sun_are_those_of_the_text(self):
+        typed = 'click sun\nclick "tab Properties"\nwait 0.3\ndouble-click-at sun.colour[1] 0.5 0.5\nkey CTRL+A\ntype 0,25\nkey ENTER\nwait 0.4\n'
+        self.assertEqual(self.saved(self.SUN, self.PROBLEM + typed + self.MENDED), self.SUN.replace("[0.1, 0.2, 0.3]", "[0.1, 0.25, 0.3]"))
+        # The dial, which shows the sun of the earlier text, moves nothing and says so.
+        self.assertEqual(self.saved(self.SUN, self.PROBLEM + 'click sun\nclick "tab Properties"\nwait 0.3\ndrag "sun dial" 20 10\nwait 0.1\n'
+                                    "expect-control refusal\n" + self.MENDED), self.SUN)
+
+    def test_nothing_is_recorded(self):
+        """It would hold from the first step on. What is typed is told, and an autosave has it."""
+        record = 'click "tab View"\nclick "Record as key frames"\n'
+        typed = ('click wind\nclick wind[0]\nclick wind[0].levels\nclick wind[0].levels[0]\nclick "tab Properties"\nwait 0.3\n'
+                 "double-click-at wind[0].levels[0].speed_m_per_s 0.5 0.5\nkey CTRL+A\ntype 12.5\nwait 0.3\n")
+        text = self.HEAD + WIND[WIND.index("[[wind]]"):]
+        self.assertEqual(self.saved(text, record + self.PROBLEM + typed + "key ENTER\nwait 0.1\nexpect-control refusal\n" + self.MENDED), text)
+
+    def test_what_a_signal_keeps_is_what_enter_records(self):
+        scene = self.folder / "w.toml"
+        typed = self.AT_STEP_3 + ('click "tab View"\nclick "Record as key frames"\nclick wind\nclick wind[0]\nclick wind[0].levels\n'
+                 'click wind[0].levels[0]\nclick "tab Properties"\nwait 0.3\ndouble-click-at wind[0].levels[0].speed_m_per_s 0.5 0.5\n'
+                 "key CTRL+A\ntype 12.5\nwait 0.3\n")
+        text = self.HEAD + "# mine\n" + WIND[WIND.index("[[wind]]"):]
+        scene.write_text(text, encoding="utf-8")
+        kept = self.keep_by_signal(scene, typed, signal.SIGTERM)
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script=typed + "key ENTER\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+        self.assertEqual(scene.read_text(encoding="utf-8"), kept)
+        self.assertTrue(kept.startswith(text), "the key frame that stays, and what its author wrote beside it\n" + kept)
+
+    def test_a_first_key_frame_leaves_the_others(self):
+        """At the time of one that is there only its numbers change; one before the first comes in front of it."""
+        at_start = 'click sun\nclick "tab Properties"\nwait 0.3\nkey HOME\nwait 0.4\n'
+        self.assertEqual(self.saved(self.SUN, at_start + "set sun.elevation_deg 33\nwait 0.3\n"),
+                         self.SUN.replace("time_s = 0\nelevation_deg = 40", "time_s = 0\nelevation_deg = 33"))
+        late = self.SUN.replace("time_s = 0", "time_s = 10").replace("[[sun.path]] # first", "# the first\n[[sun.path]] # first")
+        saved = self.saved(late, at_start + "set sun.elevation_deg 33\nwait 0.3\n")
+        begin = late.index("# the first")
+        self.assertEqual((saved[:begin], saved[-len(late[begin:]):]), (late[:begin], late[begin:]))
+        self.assertEqual([(key["time_s"], key["elevation_deg"]) for key in tomllib.loads(saved)["sun"]["path"]], [(0, 33), (10, 40), (20, 39)])
+
+
 class Models(Case):
     def test_clouds_of_a_model(self):
         """Generate again counts up; twenty sketches show different clouds; the chosen one becomes a base model whose seeds
