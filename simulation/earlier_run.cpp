@@ -242,7 +242,7 @@ void remove_earlier_run(const RunFolder& folder) {
     for (const std::filesystem::path& path : earlier_files(folder)) remove_file(path);
 }
 
-void remove_leftovers(const RunFolder& folder) {
+void remove_leftovers(const RunFolder& folder, const Scene& scene) {
     const auto remove_if = [&](const std::string& part, const auto& is_ours) {
         for (const std::string& name : names_in_folder(folder.folder / part)) {
             const std::string published = published_name(name);
@@ -257,7 +257,12 @@ void remove_leftovers(const RunFolder& folder) {
     const auto is_frame = [&](const std::string& name) {
         return is_frame_of(name, folder.name) || name == folder.video().filename();
     };
-    for (const std::string& part : frame_parts(folder)) remove_if(part, is_frame);
+    const std::vector<std::filesystem::path> own = folders_of_run(folder, scene);
+    for (const std::string& part : frame_parts(folder)) {
+        std::error_code error;
+        const bool is_link = std::filesystem::is_symlink(folder.folder / part, error);
+        if (!is_link || std::ranges::count(own, folder.folder / part) > 0) remove_if(part, is_frame);
+    }
 }
 
 void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs) {

@@ -21,8 +21,8 @@ namespace nephos {
 void remove_earlier_run(const RunFolder& folder);
 
 // Removes the temporary files of a run that was killed. Only for the holder of the folder's lock: to nobody else
-// are they leftovers. Throws Error(io).
-void remove_leftovers(const RunFolder& folder);
+// are they leftovers, nor are those behind links to where the scene writes nothing. Throws Error(io).
+void remove_leftovers(const RunFolder& folder, const Scene& scene);
 
 // What `--resume` finds in a folder.
 enum class Resumption {

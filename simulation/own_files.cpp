@@ -51,6 +51,9 @@ bool is_frame_place(const RunFolder& folder, const Scene& scene, const Simulatio
 OwnFiles::OwnFiles(RunFolder folder, EarlierRun run, const Scene& scene)
     : folder_(std::move(folder)), run_(std::move(run)), scene_(scene) {
     folder_.name = run_.name;
+    for (const std::filesystem::path& part : folders_of_run(folder_, scene))
+        if (const std::optional<FileIdentity> identity = identity_behind(part))
+            folders_.emplace(*identity, part);
     if (!run_.complete) return;
     const RunListing listing = read_run(folder_.folder);
     const auto add = [&](const std::vector<FileRecord>& records) {
@@ -71,17 +74,32 @@ bool OwnFiles::is_place(const std::filesystem::path& file) const {
            is_frame_place(folder_, scene_, run_.range, run_.render, file);
 }
 
-std::optional<std::string> OwnFiles::why_foreign(const std::filesystem::path& file) const {
-    const std::string path = file.lexically_relative(folder_.folder).generic_string();
-    const std::string other = fmt::format("{} is not what the run in it has written", path);
+bool OwnFiles::is_own_path(const std::filesystem::path& file) const {
+    if (listed_.contains(file.lexically_relative(folder_.folder).generic_string())) return true;
     const bool is_frame = is_frame_of(file.filename().string(), folder_.name) || file == folder_.video();
-    if (const auto found = listed_.find(path); found != listed_.end())
-        return has_content(file, found->second, true) ? std::nullopt : std::optional(other);
-    if ((is_frame ? !listed_.empty() : lists_tables_) || !is_place(file))
-        return fmt::format("there is {}, which the run in it has not written", path);
+    return !(is_frame ? !listed_.empty() : lists_tables_) && is_place(file);
+}
+
+std::filesystem::path OwnFiles::own_path(const std::filesystem::path& file) const {
+    const std::optional<FileIdentity> place = identity_behind(file.parent_path());
+    if (!place || is_own_path(file)) return file;
+    const auto [begin, end] = folders_.equal_range(*place);
+    const auto found = std::find_if(
+        begin, end, [&](const auto& folder) { return is_own_path(folder.second / file.filename()); });
+    return found == end ? file : found->second / file.filename();
+}
+
+std::optional<std::string> OwnFiles::why_foreign(const std::filesystem::path& file) const {
+    const std::filesystem::path own = own_path(file);
+    const std::string path = own.lexically_relative(folder_.folder).generic_string();
+    if (!is_own_path(own)) return fmt::format("there is {}, which the run in it has not written", path);
+    const auto listed = listed_.find(path);
     const auto table = std::ranges::find(run_.tables, path, &FileRecord::path);
-    if (table != run_.tables.end() && !has_content(file, table->digest, false)) return other;
-    return std::nullopt;
+    const bool is_right = listed != listed_.end()      ? has_content(own, listed->second, true)
+                          : table != run_.tables.end() ? has_content(own, table->digest, false)
+                                                       : true;
+    if (is_right) return std::nullopt;
+    return fmt::format("{} is not what the run in it has written", path);
 }
 
 }  // namespace nephos

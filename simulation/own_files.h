@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/digest.h"
+#include "core/paths.h"
 #include "scenes/format/scene.h"
 #include "simulation/manifest.h"
 #include "simulation/run_folder.h"
@@ -22,7 +23,7 @@ bool is_frame_of(const std::string& file, const std::string& name);
 bool is_frame_place(const RunFolder& folder, const Scene& scene, const SimulationRange& range, bool pictures,
                     const std::filesystem::path& file);
 
-// The files of a run. Of a complete one its manifest lists them with their checksums; of others, and of those of earlier versions,
+// The files of a run, by whatever path through links they are reached. Of a complete one its manifest lists them with their checksums; of others, and of those of earlier versions,
 // the places tell them to which it writes, and of a table its beginning as far as the manifest lists it.
 class OwnFiles {
   public:
@@ -35,12 +36,16 @@ class OwnFiles {
 
   private:
     bool is_place(const std::filesystem::path& file) const;
+    bool is_own_path(const std::filesystem::path& file) const;
+    // Returns the path of the run's own by which a file is reached, too; the path itself where there is none.
+    std::filesystem::path own_path(const std::filesystem::path& file) const;
 
     RunFolder folder_;
     EarlierRun run_;
     const Scene& scene_;
     std::map<std::string, FileDigest> listed_;  // by path below the folder
     bool lists_tables_ = false;
+    std::multimap<FileIdentity, std::filesystem::path> folders_;  // that the run writes to
 };
 
 }  // namespace nephos

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -162,6 +163,18 @@ void make_density_folders(const RunFolder& folder, const Scene& scene) {
     }
 }
 
+// Locks the folders that are there in the one that is locked: by links they may be those of other runs, too.
+std::vector<FolderLock> lock_parts(const RunFolder& folder, const Scene& scene) {
+    std::set<FileIdentity> known;
+    std::vector<FolderLock> locks;
+    for (const std::filesystem::path& part : folders_of_run(folder, scene)) {
+        const std::optional<FileIdentity> identity = identity_behind(part);
+        if (!identity || !known.insert(*identity).second || part == folder.folder) continue;
+        if (type_behind(part) == std::filesystem::file_type::directory) locks.emplace_back(part, "run");
+    }
+    return locks;
+}
+
 }  // namespace
 
 std::filesystem::path RunFolder::density(int frame) const {
@@ -191,6 +204,15 @@ std::vector<std::filesystem::path> picture_files(const RunFolder& folder, const 
     if (wants_png(scene)) files.push_back(folder.picture(frame, ".png"));
     if (scene.frames.enabled && scene.frames.exr) files.push_back(folder.picture(frame, ".exr"));
     return files;
+}
+
+std::vector<std::filesystem::path> folders_of_run(const RunFolder& folder, const Scene& scene) {
+    std::vector<std::filesystem::path> folders{folder.folder, folder.folder / "density",
+                                               folder.folder / "frames"};
+    for (const std::filesystem::path& file : density_files(folder, scene, 1))
+        if (file.parent_path() != folders[1]) folders.push_back(file.parent_path());
+    if (!scene.layers.empty()) folders.push_back(folder.folder / "statistics");
+    return folders;
 }
 
 std::filesystem::path RunFolder::video() const { return folder / "frames" / (name + ".mp4"); }
@@ -246,6 +268,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
 
     const auto lock = std::make_shared<const FolderLock>(folder.folder, "run");
     recorder.set_guard([lock] { lock->require_in_place(); });
+    const std::vector<FolderLock> locks_of_parts = lock_parts(folder, settings.scene);
     const Resumption resumption = found();  // once more: another run may have been at work until now
     if (resumption == Resumption::complete) return report_of_complete(settings, folder);
     settings.resume = resumption == Resumption::go_on;
@@ -257,7 +280,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         refuse_to_replace_next_frames(folder, settings);
     }
     if (settings.range.last_frame >= settings.range.first_frame) make_density_folders(folder, settings.scene);
-    if (lock->held()) remove_leftovers(folder);
+    if (lock->held()) remove_leftovers(folder, settings.scene);
     Simulation& simulation =
         made.emplace(settings.resume   ? resumed_simulation(settings, folder, inputs)
                      : settings.branch ? branched_simulation(settings, folder)

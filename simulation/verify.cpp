@@ -40,6 +40,20 @@ void add_extra_files(const RunListing& run, const std::set<std::string>& listed,
     }
 }
 
+// Removes what is one of the listed files by another path, as where a link makes one folder of two.
+void remove_listed(const RunListing& run, const std::set<std::string>& listed,
+                   std::vector<std::filesystem::path>& extra) {
+    if (extra.empty()) return;
+    std::multimap<std::string, std::filesystem::path> by_name;
+    for (const std::string& name : listed)
+        by_name.emplace(std::filesystem::path(name).filename().string(), run.folder / name);
+    std::erase_if(extra, [&](const std::filesystem::path& path) {
+        const auto [begin, end] = by_name.equal_range(path.filename().string());
+        return std::any_of(begin, end,
+                           [&](const auto& file) { return is_same_place(run.folder / path, file.second); });
+    });
+}
+
 Check check_numbers(const RunListing& run) {
     Problems problems;
     std::set<int> numbers;
@@ -217,6 +231,7 @@ Verification verify_run(const std::filesystem::path& folder, const VerifyOptions
     Problems unlisted;
     try {
         for (const char* part : {"density", "frames", "statistics"}) add_extra_files(run, names, part, extra);
+        remove_listed(run, names, extra);
         std::ranges::sort(extra);
     } catch (const ReadFailure& failure) {
         unlisted.add(failure.what());

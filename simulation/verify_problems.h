@@ -4,6 +4,7 @@
 // The text of a check of `nephos verify`. Private to the module.
 
 #include <cstddef>
+#include <set>
 #include <string>
 
 #include <fmt/format.h>
@@ -12,12 +13,11 @@
 
 namespace nephos {
 
-// Counts problems of one kind, and tells the first of them.
+// Counts problems of one kind, and tells the first of them. The same one is counted once, as that of one source of several files.
 class Problems {
   public:
     void add(const std::string& text) {
-        if (text == last_) return;  // one source of several files
-        last_ = text;
+        if (known_.size() < kKnown && !known_.insert(text).second) return;
         if (++count_ <= kNamed) text_ += (text_.empty() ? "" : "; ") + text;
     }
     bool none() const { return count_ == 0; }
@@ -29,12 +29,14 @@ class Problems {
     Check not_done(const std::string& name) const { return {name, false, text(), {}, false}; }
 
   private:
-    static constexpr std::size_t kNamed = 3;  // problems that are told
+    static constexpr std::size_t kNamed = 3;       // problems that are told
+    static constexpr std::size_t kKnown = 10'000;  // and that are compared with others
     std::string text() const {
         return count_ > kNamed ? fmt::format("{}; and {} more", text_, count_ - kNamed) : text_;
     }
     std::size_t count_ = 0;
-    std::string text_, last_;
+    std::string text_;
+    std::set<std::string> known_;
 };
 
 }  // namespace nephos

@@ -87,7 +87,8 @@ ListedExport read_export(const std::filesystem::path& folder);
 bool is_of_file(const std::filesystem::path& path, const Error& error);
 
 // Compares the sidecars with the list, and with the box of their sources, where those are there and unchanged; none where there is
-// no sidecar. That of a complete export of volumes must be there.
-std::optional<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list);
+// no sidecar. That of a complete export of volumes must be there. Beside what is wrong with them a check of its own tells the sources
+// that cannot be read.
+std::vector<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list);
 
 }  // namespace nephos

@@ -159,20 +159,23 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
     for (const ExportedFile& file : list.files) {
         if (file.source.empty()) continue;
         ++of_sources;
+        bool is_changed = false;  // then it may be why they differ
         try {
             const ListedExport::Sequence* s = sequence_of(list, file.path.generic_string());
             if (s == nullptr || !is_there(folder / file.source)) {
                 ++lost;
                 continue;
             }
-            if (file.source_digest && !(file_digest(folder / file.source) == *file.source_digest)) ++changed;
+            is_changed = file.source_digest && !(file_digest(folder / file.source) == *file.source_digest);
             if (compare_file(folder, list, *s, file, formats[file.format])) ++counts[file.format];
+            changed += is_changed;
         } catch (const ReadFailure& failure) {  // which says nothing of its content
             unread.add(failure.what());
         } catch (const Error& failure) {
             const bool is_bad = is_of_file(folder / file.path, failure);
             if (!is_bad && !is_of_file(folder / file.source, failure)) throw;
             (is_bad ? bad : unread).add(failure.what());
+            changed += is_changed && is_bad;
         }
     }
     std::vector<Check> checks;
@@ -196,7 +199,7 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
                          changed)});
     if (lost > 0)
         checks.push_back(
-            {"sources",
+            {"missing sources",
              true,
              fmt::format("{} of {} files were not compared: their sources are not there any more{}", lost,
                          of_sources,
@@ -241,8 +244,7 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
         if (!names.contains(name)) extra.emplace_back(name);
     for (Check& check : check_files(folder, files, extra)) result.checks.push_back(std::move(check));
     if (!options.hashes_only) {
-        if (std::optional<Check> check = check_sidecars(folder, list))
-            result.checks.push_back(std::move(*check));
+        for (Check& check : check_sidecars(folder, list)) result.checks.push_back(std::move(check));
         for (Check& check : check_voxels(folder, list)) result.checks.push_back(std::move(check));
     }
     return result;

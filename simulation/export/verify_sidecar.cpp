@@ -134,7 +134,7 @@ void check_sidecar(const std::filesystem::path& path, const ListedExport& list,
 
 }  // namespace
 
-std::optional<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list) {
+std::vector<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list) {
     std::set<std::string> listed;
     for (const ExportedFile& file : list.files) listed.insert(file.path.generic_string());
     std::size_t count = 0, compared = 0;
@@ -161,13 +161,15 @@ std::optional<Check> check_sidecars(const std::filesystem::path& folder, const L
         }
     }
     if (count == 0) return {};
-    if (bad.none() && !unread.none()) return unread.not_done("sidecars");
+    if (bad.none() && !unread.none()) return {unread.not_done("sidecars")};
     const char* found =
         compared == count
             ? "box, axes, levels, names, types, scale and frames are those of list and sources"
             : "names, types, scale and frames are those of the list; box, axes and levels were not "
               "compared: sources are not there, or have changed";
-    return bad.check("sidecars", found);
+    std::vector<Check> checks{bad.check("sidecars", found)};
+    if (!unread.none()) checks.push_back(unread.not_done("sources of sidecars"));
+    return checks;
 }
 
 }  // namespace nephos

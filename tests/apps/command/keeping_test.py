@@ -268,6 +268,54 @@ class Keeping(Case):
         self.kept("a", 2, "run", scene, "--no-render", "--out", "a", says="statistics/low.csv is not what the run in it has written")
         self.assertEqual(self.files("b"), other)
 
+    def test_own_files_by_another_path(self):
+        """A link of the user's to one of the run's own folders, and a folder for two kinds of its files."""
+        scene = self.write("layered.toml", LAYERED.replace("enabled = false", "count = 2") + "[density]\nper_layer = true\n")
+        self.call("run", scene, "--no-render", "--out", "out")
+        for name, target in (("latest", "low"), ("zlatest", "low"), ("all", ".")):
+            (self.folder / "out/density" / name).symlink_to(target)
+        self.call("run", scene, "--no-render", "--out", "out")
+        manifest = self.folder / "out/manifest.json"
+        manifest.write_text(unsealed({**json.loads(manifest.read_text()), "complete": False}))
+        (self.folder / "out/checkpoint.nephos").unlink()
+        self.call("run", scene, "--no-render", "--out", "out")
+        (self.folder / "both/density").mkdir(parents=True)
+        (self.folder / "both/frames").symlink_to("density")
+        for _ in range(2):
+            self.call("run", self.scene, "--splatting", "cpu", "-q", "--out", "both")
+        self.call("verify", "both")
+
+    @unittest.skipUnless(shutil.which("strace"), "strace is not installed")
+    def test_two_runs_into_one_folder_of_frames(self):
+        """By links: while one is at work the other does not begin."""
+        (self.folder / "disk").mkdir()
+        for out in ("a", "b"):
+            (self.folder / out).mkdir()
+            (self.folder / out / "density").symlink_to("../disk")
+        first = subprocess.Popen(["strace", "-f", "-qq", "-e", "trace=rename,renameat,renameat2", "-e",
+                                  "inject=rename,renameat,renameat2:delay_enter=500000", "-o", "/dev/null", NEPHOS, *map(str, self.plain),
+                                  "--out", "a"], cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+        while first.poll() is None and not (self.folder / "a/statistics.csv").exists():
+            time.sleep(0.01)
+        self.assertIsNone(first.poll())
+        self.assertEqual(list((self.folder / "disk").glob("*.vdb")), [])
+        self.refused(3, *self.plain, "--seed", "9", "--out", "b", says="b/density: another run or export is writing into this folder")
+        _, said = first.communicate(timeout=60)
+        self.assertEqual(first.returncode, 0, said)
+        self.call("verify", "a")
+
+    def test_what_another_run_is_about_to_publish_is_no_leftover(self):
+        (self.folder / "disk").mkdir()
+        self.call(*self.plain, "--out", "own")
+        for folder, is_kept in (("density", False), ("density/other", True)):
+            (self.folder / "own" / folder).parent.mkdir(exist_ok=True)
+            if is_kept:
+                (self.folder / "own" / folder).symlink_to("../../disk")
+            hidden = self.folder / "own" / folder / ".tiny_0009.part123-456.vdb"
+            hidden.write_text("on the way")
+            self.call(*self.plain, "--out", "own", "--resume")
+            self.assertEqual(hidden.exists(), is_kept, folder)
+
     def test_a_file_called_like_the_next_frame(self):
         self.call(*self.plain, "--set", "time.steps=4", "--out", "run")
         frames = sorted((self.folder / "run/density").iterdir())
