@@ -12,6 +12,7 @@
 #include "study/emulator.h"
 #include "study/target_match.h"
 #include "study/transform.h"
+#include "study/unit_box.h"
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
@@ -28,52 +29,6 @@ constexpr std::size_t kSamples = 1000;
 constexpr int kMostBatches = 16;
 constexpr double kEarned = 0.95;  // of the error: what a larger region must earn its place with
 constexpr double kPriorDeviation = 0.28867513459481287;  // of a uniform number
-
-using Point = std::vector<double>;  // of the unit cube
-
-// A part of the unit cube.
-struct Box {
-    std::vector<double> low, high;
-    explicit Box(std::size_t d) : low(d, 0.0), high(d, 1.0) {}
-    bool holds(const Point& point) const {
-        for (std::size_t n = 0; n < point.size(); ++n)
-            if (point[n] < low[n] || point[n] > high[n]) return false;
-        return true;
-    }
-    bool is_whole() const {
-        return std::ranges::all_of(low, [](double x) { return x == 0; }) &&
-               std::ranges::all_of(high, [](double x) { return x == 1; });
-    }
-    // Grows by a factor about its middle, within the cube.
-    Box grown(double factor) const {
-        Box box = *this;
-        for (std::size_t d = 0; d < low.size(); ++d) {
-            const double more = (factor - 1) / 2 * (high[d] - low[d]);
-            box.low[d] = std::max(0.0, low[d] - more);
-            box.high[d] = std::min(1.0, high[d] + more);
-        }
-        return box;
-    }
-};
-
-// Whether points, one after the other, reach to all sides of a box. None lies on a side of the cube itself, where the prior
-// ends: such a side is reached when points that fill the box could leave that gap, two of their spacings.
-bool surround(const std::vector<double>& points, const Box& box) {
-    const std::size_t dimensions = box.low.size();
-    const double count = double(points.size() / dimensions);
-    const double gap = 2 / std::pow(std::max(1.0, count), 1 / double(dimensions));  // of the width
-    for (std::size_t d = 0; d < dimensions; ++d) {
-        double low = 1, high = 0;
-        for (std::size_t n = d; n < points.size(); n += dimensions) {
-            low = std::min(low, points[n]);
-            high = std::max(high, points[n]);
-        }
-        const double width = box.high[d] - box.low[d];
-        const double below = box.low[d] > 0 ? 0 : gap * width, above = box.high[d] < 1 ? 0 : gap * width;
-        if (low > box.low[d] + below || high < box.high[d] - above) return false;
-    }
-    return true;
-}
 
 // The number of equally likely points that tell as much as points of these weights (Kong 1992).
 double effective_number(const std::vector<double>& weights) {
@@ -128,13 +83,13 @@ class Fitter {
 
   private:
     // The next points of the one Sobol sequence of the fit, in a box: no two calls give the same ones.
-    std::vector<Point> take(const Box& box, std::uint64_t count) {
+    std::vector<Point> take(const UnitBox& box, std::uint64_t count) {
         const std::vector<double> unit = sobol_points(taken_, count, dimensions_, problem_.seed);
         taken_ += count;
         return points_of(box, unit);
     }
 
-    static std::vector<Point> points_of(const Box& box, const std::vector<double>& unit) {
+    static std::vector<Point> points_of(const UnitBox& box, const std::vector<double>& unit) {
         const std::size_t dimensions = box.low.size();
         std::vector<Point> points(unit.size() / dimensions, Point(dimensions));
         for (std::size_t n = 0; n < points.size(); ++n)
@@ -199,7 +154,7 @@ class Fitter {
         double least = std::numeric_limits<double>::infinity();
         const bool any_inside =
             std::ranges::any_of(runs_, [&](const FitRun& r) { return box_.holds(r.unit); });
-        for (Box box = box_;; box = box.grown(2)) {
+        for (UnitBox box = box_;; box = box.grown(2)) {
             std::vector<double> points, values, errors;
             std::vector<bool> inside;
             for (const FitRun& run : runs_) {
@@ -250,12 +205,12 @@ class Fitter {
     // The box around the points that are kept, in a few rounds of ever finer Sobol points. Two more spacings on every side, so
     // that nothing is cut off between points.
     template <typename Keep>
-    Box zoomed(Keep&& keep) {
-        Box box = looked_at_;
+    UnitBox zoomed(Keep&& keep) {
+        UnitBox box = looked_at_;
         for (int round = 0; round < 8; ++round) {
             const std::vector<Point> points = take(box, kCandidates);
             const std::vector<bool> kept = keep(points);
-            Box next(dimensions_);
+            UnitBox next(dimensions_);
             bool any = false;
             for (std::size_t d = 0; d < dimensions_; ++d) {
                 double low = 1, high = 0;
@@ -284,7 +239,7 @@ class Fitter {
     // The emulators are of a region three times as wide: a slope needs a distance.
     std::vector<Point> narrow(std::uint64_t count) {
         double limit = kImplausible;
-        const Box possible = zoomed([&](const std::vector<Point>& points) {
+        const UnitBox possible = zoomed([&](const std::vector<Point>& points) {
             std::vector<double> values;
             for (const Point& point : points) values.push_back(implausibility(point));
             // Where nothing is possible, what comes closest is looked at.
@@ -301,7 +256,7 @@ class Fitter {
 
     // Up to `count` points of a box that were not run and are not implausible: Sobol points, and where few of them are, as on
     // a ridge through a box of many dimensions, also points ever closer to those that were found.
-    std::vector<Point> proposals(const Box& box, double limit, std::uint64_t count) {
+    std::vector<Point> proposals(const UnitBox& box, double limit, std::uint64_t count) {
         std::vector<Point> found;
         std::set<Point> known;
         const auto add = [&](const std::vector<Point>& points) {
@@ -316,7 +271,7 @@ class Fitter {
         const std::vector<Point> centres = found;
         for (double share = 0.5; share > 1e-9 && found.size() < count && !centres.empty(); share /= 2) {
             for (const Point& centre : centres) {
-                Box near(dimensions_);
+                UnitBox near(dimensions_);
                 for (std::size_t d = 0; d < dimensions_; ++d) {
                     const double reach = share / 2 * (box.high[d] - box.low[d]);
                     near.low[d] = std::max(0.0, centre[d] - reach);
@@ -329,7 +284,7 @@ class Fitter {
     }
 
     FitResult posterior() {
-        const Box box = zoomed([&](const std::vector<Point>& points) {
+        const UnitBox box = zoomed([&](const std::vector<Point>& points) {
             std::vector<double> values;
             for (const Point& point : points) values.push_back(log_likelihood(point));
             const double limit = *std::ranges::max_element(values) - 12;
@@ -506,7 +461,7 @@ class Fitter {
     std::size_t dimensions_;
     // Twice and three times as wide as where the targets are possible: what is looked at, for a wave knows its own errors only
     // roughly, and the region of the emulators.
-    Box looked_at_, box_;
+    UnitBox looked_at_, box_;
     std::vector<Transform> transforms_;
     std::vector<FitRun> runs_;    // statistics transformed
     std::set<Point> tried_;       // of all runs, those that were lost included

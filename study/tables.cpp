@@ -9,8 +9,8 @@
 
 #include "study/folder_contents.h"
 #include "study/folder_guard.h"
-#include "study/netcdf_file.h"
 #include "study/placed_scene.h"
+#include "study/series_table.h"
 #include "study/student.h"
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -30,7 +30,6 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kErrorsDiffer = 3;
 constexpr double kChance = 0.01;
-constexpr int kSeedDigits = 19;  // of 63 bits
 
 std::string field(double value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string(); }
 
@@ -152,217 +151,10 @@ void write_tracks(const SweepPlan& plan, const Records& records, const std::file
     });
 }
 
-// The runs that are done, in the order of the plan.
-struct DoneRun {
-    PlannedRun run;
-    const RunRecord* record;
-};
-
-using Put = std::function<void(double)>;
-
-NetcdfVariable variable(std::string name, NetcdfType type, std::vector<std::size_t> dimensions,
-                        NetcdfAttributes attributes, std::function<void(const Put&)> values) {
-    return {std::move(name), type, std::move(dimensions), std::move(attributes), std::move(values)};
-}
-
-NetcdfAttributes described(std::string_view unit, std::string_view definition,
-                           std::string_view standard_name = {}) {
-    NetcdfAttributes attributes{{"units", std::string(unit)}, {"long_name", std::string(definition)}};
-    if (!standard_name.empty()) attributes.emplace_back("standard_name", standard_name);
-    return attributes;
-}
-
 void remove_table(const std::filesystem::path& path) {
     std::error_code error;
     std::filesystem::remove(path, error);
     if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
-}
-
-// The series of the runs of a table, which is written one series of all runs after the other: those that fit into so much
-// memory are unpacked once, the others for each series anew.
-class UnpackedSeries {
-  public:
-    UnpackedSeries(const Records& records, std::size_t runs) : records_(records), kept_(runs) {}
-    // What is returned lives until the next call.
-    const std::vector<float>& of(std::size_t run, const RunRecord& record) {
-        if (!kept_[run].empty()) return kept_[run];
-        std::vector<float> values = records_.series(record);
-        const std::size_t bytes = values.size() * sizeof(float);
-        if (bytes > left_) return current_ = std::move(values);
-        left_ -= bytes;
-        return kept_[run] = std::move(values);
-    }
-
-  private:
-    const Records& records_;
-    std::vector<std::vector<float>> kept_;
-    std::size_t left_ = std::size_t(128) << 20;
-    std::vector<float> current_;
-};
-
-// Places the values of a run in time and height.
-struct RunCoordinates {
-    double step_s, floor_m, level_m;
-    bool operator==(const RunCoordinates&) const = default;
-};
-
-RunCoordinates coordinates_of(const AutomatonOptions& lattice) {
-    return {lattice.time_step_s, lattice.placement.origin_m.z, lattice.placement.cell_size_m};
-}
-
-// Returns those of each run, or one where all runs have the same.
-std::vector<RunCoordinates> coordinates_of(const SweepPlan& plan, const std::vector<DoneRun>& done) {
-    if (!plan.varies_lattice()) return {coordinates_of(plan.lattice())};
-    std::vector<RunCoordinates> all;
-    for (std::size_t n = 0; n < done.size(); ++n)
-        all.push_back(n > 0 && done[n].run.point == done[n - 1].run.point
-                          ? all.back()
-                          : coordinates_of(plan.lattice_of(done[n].run)));
-    if (std::ranges::all_of(all, [&](const RunCoordinates& one) { return one == all.front(); }))
-        all.resize(1);
-    return all;
-}
-
-// Names the auxiliary coordinates of every variable over runs that is not one of them (CF 1.8, section 5).
-void add_coordinates(std::vector<NetcdfVariable>& variables, const std::string& of_run) {
-    constexpr std::string_view kOfDimension[] = {"", " time", " height", " size_bin_begin"};
-    for (NetcdfVariable& variable : variables) {
-        const bool is_coordinate =
-            (" " + of_run + " time height ").find(" " + variable.name + " ") != std::string::npos;
-        if (variable.dimensions.front() != 0 || is_coordinate) continue;
-        const std::size_t other = variable.dimensions.size() > 1 ? variable.dimensions[1] : 0;
-        variable.attributes.emplace_back("coordinates", of_run + std::string(kOfDimension[other]));
-    }
-}
-
-void write_series(const SweepPlan& plan, const Records& records, const std::filesystem::path& path) {
-    std::vector<DoneRun> done;
-    std::uint64_t steps = 0;
-    std::size_t levels = 0, bins = 1;
-    for (std::uint64_t n = 0; n < plan.runs(); ++n) {
-        PlannedRun run = plan.run(n);
-        const RunRecord* record = records.find(run.id);
-        if (record == nullptr || record->failed) continue;
-        steps = std::max(steps, record->result.steps);
-        levels = std::max(levels, record->result.profile.size());
-        bins = std::max(bins, record->result.sizes.size());
-        done.push_back({std::move(run), record});
-    }
-    if (done.empty()) return remove_table(path);
-    levels = std::max<std::size_t>(levels, 1);
-    const std::vector<RunCoordinates> coordinates = coordinates_of(plan, done);
-    const std::vector<NetcdfDimension> dimensions{{"run", done.size()},
-                                                  {"step", steps + 1},
-                                                  {"level", levels},
-                                                  {"size_bin", bins},
-                                                  {"run_id_length", 32},
-                                                  {"seed_length", kSeedDigits}};
-    std::vector<NetcdfVariable> variables;
-    std::string of_run = "run_id realization point seed";  // auxiliary coordinates
-    const auto each_run = [&done](auto value) {
-        return [&done, value](const Put& put) {
-            for (const DoneRun& one : done) put(value(one));
-        };
-    };
-    variables.push_back(variable("run_id", NetcdfType::text, {0, 4},
-                                 {{"long_name", "id of the run, as in runs.csv"}}, [&](const Put& put) {
-                                     for (const DoneRun& one : done)
-                                         for (const char c : one.run.id) put(c);
-                                 }));
-    variables.push_back(variable("realization", NetcdfType::int32, {0},
-                                 described("1", "replicate of the point", "realization"),
-                                 each_run([](const DoneRun& one) { return double(one.run.replicate); })));
-    // Text: the format has no whole numbers of 64 bits.
-    variables.push_back(variable("seed", NetcdfType::text, {0, 5}, {{"long_name", "seed of the run, a whole number"}},
-                                 [&](const Put& put) {
-                                     for (const DoneRun& one : done)
-                                         for (const char c : fmt::format("{:<{}}", one.run.seed, kSeedDigits)) put(c);
-                                 }));
-    variables.push_back(variable("point", NetcdfType::int32, {0}, described("1", "point, as in points.csv"),
-                                 each_run([](const DoneRun& one) { return double(one.run.point); })));
-    variables.push_back(variable(
-        "steps", NetcdfType::int32, {0}, described("1", "steps of the run; later values are missing"),
-        each_run([](const DoneRun& one) { return double(one.record->result.steps); })));
-    variables.push_back(
-        variable("warm_up_steps", NetcdfType::int32, {0}, described("1", "steps before the mean"),
-                 each_run([](const DoneRun& one) { return double(one.record->result.warm_up); })));
-    for (std::size_t axis = 0; axis < plan.options().axes.size(); ++axis) {
-        for (std::string key : plan.options().axes[axis].keys) {
-            const std::string long_name = key;
-            for (char& c : key)
-                if (c == '.' || c == '[' || c == ']') c = '_';
-            of_run += " " + key;
-            variables.push_back(variable(key, NetcdfType::float64, {0}, {{"long_name", long_name}},
-                                         each_run([axis](const DoneRun& one) {
-                                             const std::string& text = one.run.values[axis];
-                                             char* end = nullptr;
-                                             const double value = std::strtod(text.c_str(), &end);
-                                             return end != text.c_str() && *end == 0 ? value : kNaN;
-                                         })));
-        }
-    }
-    const auto in_runs = [&](std::size_t dimension) {
-        return coordinates.size() == 1 ? std::vector{dimension} : std::vector<std::size_t>{0, dimension};
-    };
-    variables.push_back(variable("time", NetcdfType::float64, in_runs(1),
-                                 described("s", "simulated time since the start"), [&](const Put& put) {
-                                     for (const RunCoordinates& run : coordinates)
-                                         for (std::uint64_t n = 0; n <= steps; ++n)
-                                             put(double(n) * run.step_s);
-                                 }));
-    variables.push_back(variable("height", NetcdfType::float64, in_runs(2),
-                                 described("m", "centre of the level", "height"), [&](const Put& put) {
-                                     for (const RunCoordinates& run : coordinates)
-                                         for (std::size_t k = 0; k < levels; ++k)
-                                             put(run.floor_m + (double(k) + 0.5) * run.level_m);
-                                 }));
-    variables.push_back(variable("size_bin_begin", NetcdfType::float64, {3},
-                                 described("1", "smallest area of the bin, in columns"), [&](const Put& put) {
-                                     for (std::size_t n = 0; n < bins; ++n)
-                                         put(double(size_bin_begin(int(n))));
-                                 }));
-    NetcdfAttributes profile =
-        described("1", "mean cloud fraction of the level", "cloud_area_fraction_in_atmosphere_layer");
-    profile.emplace_back("cell_methods", "time: mean");
-    variables.push_back(variable("cloud_area_fraction_in_atmosphere_layer", NetcdfType::float32, {0, 2},
-                                 profile, [&](const Put& put) {
-                                     for (const DoneRun& one : done) {
-                                         const std::vector<double>& values = one.record->result.profile;
-                                         for (std::size_t k = 0; k < levels; ++k)
-                                             put(k < values.size() ? values[k] : kNaN);
-                                     }
-                                 }));
-    variables.push_back(variable("clouds_of_size", NetcdfType::float64, {0, 3},
-                                 described("1", "mean number of clouds of a snapshot in the size bin"),
-                                 [&](const Put& put) {
-                                     for (const DoneRun& one : done) {
-                                         const RunResult& r = one.record->result;
-                                         for (std::size_t n = 0; n < bins; ++n)
-                                             put(n < r.sizes.size() ? double(r.sizes[n]) / double(r.snapshots)
-                                                 : r.snapshots > 0  ? 0.0
-                                                                    : kNaN);
-                                     }
-                                 }));
-    UnpackedSeries unpacked(records, done.size());
-    for (std::size_t s = 0; s < kSeries.size(); ++s) {
-        variables.push_back(
-            variable(std::string(kSeries[s].name), NetcdfType::float32, {0, 1},
-                     described(kSeries[s].unit, kSeries[s].definition, kSeries[s].standard_name),
-                     [&, s](const Put& put) {
-                         for (std::size_t run = 0; run < done.size(); ++run) {
-                             const RunRecord& record = *done[run].record;
-                             const std::vector<float>& values = unpacked.of(run, record);
-                             const std::uint64_t count = record.result.steps + 1;
-                             for (std::uint64_t n = 0; n <= steps; ++n)
-                                 put(n < count ? double(values[s * count + n]) : kNaN);
-                         }
-                     }));
-    }
-    add_coordinates(variables, of_run);
-    write_netcdf(
-        path, dimensions,
-        {{"Conventions", "CF-1.8"}, {"title", std::string(kSweepTitle)}, {"source", "nephos " + version()}},
-        variables);
 }
 
 void write_manifest(const SweepPlan& plan, const Records& records, const std::filesystem::path& path) {
@@ -487,7 +279,7 @@ std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
     const std::function<void()> check = [&] { require_in_place(held, folder, "its tables were written"); };
     const PublishCheck keeps_in_place(check);
     // First, for damaged series alone can end it: the tables before it then stay as they are.
-    write_series(plan, records, folder / "series.nc");
+    if (!write_series_table(plan, records, folder / "series.nc")) remove_table(folder / "series.nc");
     write_runs(plan, records, folder / "runs.csv");
     write_points(plan, records, folder / "points.csv");
     const std::uint64_t missing = write_failures(plan, records, folder / "failures.csv");
