@@ -32,6 +32,11 @@ void remove_file(const std::filesystem::path& path) {
     if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
 }
 
+bool is_link(const std::filesystem::path& path) {
+    std::error_code error;
+    return std::filesystem::is_symlink(path, error);
+}
+
 // Parts of the folder that hold frames: a folder of its own for the densities of each layer.
 std::vector<std::string> frame_parts(const RunFolder& folder) {
     std::vector<std::string> parts{"density", "frames"};
@@ -70,6 +75,7 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
         }
     }
     for (const std::string& name : names_in_folder(folder.folder / "statistics")) {
+        if (!published_name(name).empty()) continue;  // the leftover of a run that was killed
         const std::filesystem::path path = folder.folder / "statistics" / name;
         if (is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
     }
@@ -242,14 +248,29 @@ void remove_earlier_run(const RunFolder& folder) {
     for (const std::filesystem::path& path : earlier_files(folder)) remove_file(path);
 }
 
-void remove_leftovers(const RunFolder& folder, const Scene& scene) {
-    const auto remove_if = [&](const std::string& part, const auto& is_ours) {
+std::vector<std::filesystem::path> folders_of_earlier_files(const RunFolder& folder) {
+    std::vector<std::filesystem::path> folders;
+    for (const std::filesystem::path& file : earlier_files(folder)) folders.push_back(file.parent_path());
+    std::ranges::sort(folders);
+    folders.erase(std::unique(folders.begin(), folders.end()), folders.end());
+    return folders;
+}
+
+void remove_leftovers(const RunFolder& folder, const HeldFolders& held) {
+    const auto is_own = [&](const std::filesystem::path& part) {
+        std::filesystem::path way = folder.folder;
+        bool has_link = false;
+        for (const std::filesystem::path& name : part) has_link = has_link || is_link(way /= name);
+        return !has_link || held.holds(way);
+    };
+    const auto remove_if = [&](const std::filesystem::path& part, const auto& is_ours) {
+        if (!is_own(part)) return;
         for (const std::string& name : names_in_folder(folder.folder / part)) {
             const std::string published = published_name(name);
             if (!published.empty() && is_ours(published)) remove_file(folder.folder / part / name);
         }
     };
-    remove_if(".", [&](const std::string& name) {
+    remove_if("", [&](const std::string& name) {
         return name == folder.manifest().filename() || name == folder.checkpoint().filename() ||
                name == folder.statistics().filename();
     });
@@ -257,12 +278,7 @@ void remove_leftovers(const RunFolder& folder, const Scene& scene) {
     const auto is_frame = [&](const std::string& name) {
         return is_frame_of(name, folder.name) || name == folder.video().filename();
     };
-    const std::vector<std::filesystem::path> own = folders_of_run(folder, scene);
-    for (const std::string& part : frame_parts(folder)) {
-        std::error_code error;
-        const bool is_link = std::filesystem::is_symlink(folder.folder / part, error);
-        if (!is_link || std::ranges::count(own, folder.folder / part) > 0) remove_if(part, is_frame);
-    }
+    for (const std::string& part : frame_parts(folder)) remove_if(part, is_frame);
 }
 
 void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs) {
@@ -294,6 +310,9 @@ void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& s
                                 "move it away, or start anew with --overwrite",
                                 file.string()));
     }
+    if (next.last_frame < next.first_frame || !stands_there(folder.video())) return;
+    if (const auto why = OwnFiles(folder.folder, earlier, settings.scene).why_foreign(folder.video()))
+        refuse(folder, *why);
 }
 
 void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
@@ -325,7 +344,7 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const 
                         earlier.steps_reported == 0 ? 0 : earlier.steps_reported - 1,
                         earlier.range.last_step));
     }
-    const OwnFiles own(folder, earlier, settings.scene);
+    const OwnFiles own(folder.folder, earlier, settings.scene);
     for (const std::filesystem::path& file : files) {
         if (file == folder.manifest()) continue;
         if (const std::optional<std::string> why = own.why_foreign(file)) refuse(folder, *why);

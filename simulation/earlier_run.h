@@ -12,6 +12,7 @@
 #include "simulation/manifest.h"
 #include "simulation/run_folder.h"
 #include "simulation/run_inputs.h"
+#include "simulation/run_parts.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -20,9 +21,12 @@ namespace nephos {
 // its manifest has; nothing else is touched. Throws Error(io).
 void remove_earlier_run(const RunFolder& folder);
 
-// Removes the temporary files of a run that was killed. Only for the holder of the folder's lock: to nobody else
-// are they leftovers, nor are those behind links to where the scene writes nothing. Throws Error(io).
-void remove_leftovers(const RunFolder& folder, const Scene& scene);
+// Returns the folders that hold files of an earlier run, as remove_earlier_run() removes them. Throws ReadFailure.
+std::vector<std::filesystem::path> folders_of_earlier_files(const RunFolder& folder);
+
+// Removes the temporary files of a run that was killed, in the folders that are held and in those that no link leads to. Only for the
+// holder of the folder's lock: to nobody else are they leftovers. Throws Error(io).
+void remove_leftovers(const RunFolder& folder, const HeldFolders& held);
 
 // What `--resume` finds in a folder.
 enum class Resumption {
@@ -43,7 +47,8 @@ void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const 
 // is in the folder.
 void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs);
 
-// Throws Error(usage) when a complete run that is lengthened would replace a file that is called like one of its next frames.
+// Throws Error(usage) when a complete run that is lengthened would replace a file that is called like one of its next frames, or as
+// its video, which is made anew.
 // After an interruption such files may be its own: they are made again.
 void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& settings);
 

@@ -11,6 +11,8 @@
 
 #include "core/paths.h"
 #include "simulation/run_listing.h"
+#include "simulation/run_parts.h"
+#include "simulation/statistics_file.h"
 
 namespace nephos {
 namespace {
@@ -48,20 +50,23 @@ bool is_frame_place(const RunFolder& folder, const Scene& scene, const Simulatio
            (pictures && std::ranges::count(picture_files(folder, scene, number), file) > 0);
 }
 
-OwnFiles::OwnFiles(RunFolder folder, EarlierRun run, const Scene& scene)
-    : folder_(std::move(folder)), run_(std::move(run)), scene_(scene) {
-    folder_.name = run_.name;
-    for (const std::filesystem::path& part : folders_of_run(folder_, scene))
+OwnFiles::OwnFiles(const std::filesystem::path& folder, EarlierRun run, const Scene& scene)
+    : folder_{folder, run.name}, run_(std::move(run)), scene_(scene) {
+    const bool frames = run_.range.last_frame >= run_.range.first_frame;
+    std::vector<std::filesystem::path> parts = parts_of_run(folder_, scene, frames, run_.render);
+    parts.push_back(folder);
+    for (const std::filesystem::path& part : parts)
         if (const std::optional<FileIdentity> identity = identity_behind(part))
             folders_.emplace(*identity, part);
     if (!run_.complete) return;
-    const RunListing listing = read_run(folder_.folder);
+    const RunListing listing = read_run(folder);
     const auto add = [&](const std::vector<FileRecord>& records) {
         for (const FileRecord& record : records) listed_.emplace(record.path, record.digest);
     };
     for (const ListedFrame& frame : listing.frames) add(frame.files);
+    lists_frames_ = !listed_.empty() || listing.frames.empty();
     add(listing.run_files);
-    lists_tables_ = !listing.run_files.empty();
+    lists_others_ = !listing.run_files.empty();
 }
 
 bool OwnFiles::is_place(const std::filesystem::path& file) const {
@@ -75,28 +80,34 @@ bool OwnFiles::is_place(const std::filesystem::path& file) const {
 }
 
 bool OwnFiles::is_own_path(const std::filesystem::path& file) const {
-    if (listed_.contains(file.lexically_relative(folder_.folder).generic_string())) return true;
-    const bool is_frame = is_frame_of(file.filename().string(), folder_.name) || file == folder_.video();
-    return !(is_frame ? !listed_.empty() : lists_tables_) && is_place(file);
+    const bool is_listed_kind =
+        is_frame_of(file.filename().string(), folder_.name) ? lists_frames_ : lists_others_;
+    if (is_listed_kind) return listed_.contains(file.lexically_relative(folder_.folder).generic_string());
+    return is_place(file);
 }
 
-std::filesystem::path OwnFiles::own_path(const std::filesystem::path& file) const {
+std::optional<std::filesystem::path> OwnFiles::own_path(const std::filesystem::path& file) const {
+    if (is_own_path(file)) return file;
     const std::optional<FileIdentity> place = identity_behind(file.parent_path());
-    if (!place || is_own_path(file)) return file;
+    if (!place) return std::nullopt;
     const auto [begin, end] = folders_.equal_range(*place);
-    const auto found = std::find_if(
-        begin, end, [&](const auto& folder) { return is_own_path(folder.second / file.filename()); });
-    return found == end ? file : found->second / file.filename();
+    for (auto folder = begin; folder != end; ++folder)
+        if (is_own_path(folder->second / file.filename())) return folder->second / file.filename();
+    return std::nullopt;
 }
 
 std::optional<std::string> OwnFiles::why_foreign(const std::filesystem::path& file) const {
-    const std::filesystem::path own = own_path(file);
-    const std::string path = own.lexically_relative(folder_.folder).generic_string();
-    if (!is_own_path(own)) return fmt::format("there is {}, which the run in it has not written", path);
+    const std::optional<std::filesystem::path> own = own_path(file);
+    const std::string path = own.value_or(file).lexically_relative(folder_.folder).generic_string();
+    if (!own) return fmt::format("there is {}, which the run in it has not written", path);
+    const bool is_layers = file.parent_path() != folder_.folder;
+    if (path.ends_with(".csv") &&
+        is_begun_statistics(*own, is_layers ? kLayerStatisticsHeader : kStatisticsHeader))
+        return std::nullopt;  // nothing is in it
     const auto listed = listed_.find(path);
     const auto table = std::ranges::find(run_.tables, path, &FileRecord::path);
-    const bool is_right = listed != listed_.end()      ? has_content(own, listed->second, true)
-                          : table != run_.tables.end() ? has_content(own, table->digest, false)
+    const bool is_right = listed != listed_.end()      ? has_content(*own, listed->second, true)
+                          : table != run_.tables.end() ? has_content(*own, table->digest, false)
                                                        : true;
     if (is_right) return std::nullopt;
     return fmt::format("{} is not what the run in it has written", path);

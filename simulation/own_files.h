@@ -23,28 +23,32 @@ bool is_frame_of(const std::string& file, const std::string& name);
 bool is_frame_place(const RunFolder& folder, const Scene& scene, const SimulationRange& range, bool pictures,
                     const std::filesystem::path& file);
 
-// The files of a run, by whatever path through links they are reached. Of a complete one its manifest lists them with their checksums; of others, and of those of earlier versions,
-// the places tell them to which it writes, and of a table its beginning as far as the manifest lists it.
+// The files of a run, by whatever path through links they are reached:
+// - of a complete run those that its manifest lists, with the content that it wrote;
+// - of one that is not complete, and of the kinds that a manifest of an earlier version does not list, those at the places to which it
+//   writes; its tables begin as the manifest says, where it says so.
 class OwnFiles {
   public:
-    // `scene`: of the run; must outlive this. Throws Error(io) where the manifest cannot be read.
-    OwnFiles(RunFolder folder, EarlierRun run, const Scene& scene);
+    // `folder`: of the run, whatever name it has there; `scene`: of the run, must outlive this. Throws Error(io) where the manifest cannot be read.
+    OwnFiles(const std::filesystem::path& folder, EarlierRun run, const Scene& scene);
 
     // Returns what is wrong with a file that the run has not written, as a sentence without its end; nothing where it has. Reads the
     // file. Throws ReadFailure.
     std::optional<std::string> why_foreign(const std::filesystem::path& file) const;
 
   private:
+    // Returns whether the run writes to a path.
     bool is_place(const std::filesystem::path& file) const;
+    // Returns whether it has written to a path.
     bool is_own_path(const std::filesystem::path& file) const;
-    // Returns the path of the run's own by which a file is reached, too; the path itself where there is none.
-    std::filesystem::path own_path(const std::filesystem::path& file) const;
+    // Returns the one of such paths by which a file is reached; nothing where there is none.
+    std::optional<std::filesystem::path> own_path(const std::filesystem::path& file) const;
 
     RunFolder folder_;
     EarlierRun run_;
     const Scene& scene_;
     std::map<std::string, FileDigest> listed_;  // by path below the folder
-    bool lists_tables_ = false;
+    bool lists_frames_ = false, lists_others_ = false;
     std::multimap<FileIdentity, std::filesystem::path> folders_;  // that the run writes to
 };
 

@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
-#include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <system_error>
 #include <utility>
 
@@ -23,6 +21,7 @@
 #include "simulation/folder_lock.h"
 #include "simulation/manifest.h"
 #include "simulation/run_inputs.h"
+#include "simulation/run_parts.h"
 #include "simulation/run_recorder.h"
 #include "simulation/scene_files.h"
 #include "simulation/statistics_file.h"
@@ -142,37 +141,26 @@ bool encode(const Simulation& simulation, RunRecorder& recorder, const RunSettin
     return true;
 }
 
-// Makes the folders of density files, where there are several. Throws Error(usage) where those of layers are
-// one, by links or on a disk for which upper and lower case are the same: the frames of one layer would
-// replace those of another.
-void make_density_folders(const RunFolder& folder, const Scene& scene) {
-    std::map<FileIdentity, std::filesystem::path> known;
-    const std::vector<std::filesystem::path> files = density_files(folder, scene, 1);
-    if (files.size() < 2) return;
-    for (const std::filesystem::path& file : files) {
-        const std::filesystem::path each = file.parent_path();
-        create_folders(each);
-        const std::optional<FileIdentity> identity = identity_behind(each);
-        if (!identity) continue;  // removed meanwhile, which whoever writes there will find
-        const auto [found, is_new] = known.try_emplace(*identity, each);
-        if (!is_new)
-            throw Error(ErrorCode::usage,
-                        fmt::format("{} and {} are one folder: the frames of one layer would replace those "
-                                    "of the other",
-                                    found->second.string(), each.string()));
+// Makes sure that nothing is lost where the run is to write, that it is there, and that nobody else writes there. Throws as
+// run_scene().
+HeldFolders hold_folders(const RunFolder& folder, const RunSettings& settings,
+                         const std::vector<RunInput>& inputs, Resumption found) {
+    const bool has_frames = settings.range.last_frame >= settings.range.first_frame;
+    HeldFolders held(folder.folder);
+    const auto hold_parts = [&] {
+        for (const std::filesystem::path& part :
+             parts_of_run(folder, settings.scene, has_frames, settings.render))
+            held.hold(part);
+    };
+    hold_parts();  // before they are looked at
+    if (!settings.resume) {
+        for (const std::filesystem::path& part : folders_of_earlier_files(folder)) held.hold(part);
+        refuse_to_remove_inputs(folder, inputs);
+        if (!settings.overwrite) refuse_to_lose(folder, settings, inputs, found);
     }
-}
-
-// Locks the folders that are there in the one that is locked: by links they may be those of other runs, too.
-std::vector<FolderLock> lock_parts(const RunFolder& folder, const Scene& scene) {
-    std::set<FileIdentity> known;
-    std::vector<FolderLock> locks;
-    for (const std::filesystem::path& part : folders_of_run(folder, scene)) {
-        const std::optional<FileIdentity> identity = identity_behind(part);
-        if (!identity || !known.insert(*identity).second || part == folder.folder) continue;
-        if (type_behind(part) == std::filesystem::file_type::directory) locks.emplace_back(part, "run");
-    }
-    return locks;
+    make_parts(folder, settings.scene, has_frames, settings.render);
+    hold_parts();  // those that are new
+    return held;
 }
 
 }  // namespace
@@ -204,15 +192,6 @@ std::vector<std::filesystem::path> picture_files(const RunFolder& folder, const 
     if (wants_png(scene)) files.push_back(folder.picture(frame, ".png"));
     if (scene.frames.enabled && scene.frames.exr) files.push_back(folder.picture(frame, ".exr"));
     return files;
-}
-
-std::vector<std::filesystem::path> folders_of_run(const RunFolder& folder, const Scene& scene) {
-    std::vector<std::filesystem::path> folders{folder.folder, folder.folder / "density",
-                                               folder.folder / "frames"};
-    for (const std::filesystem::path& file : density_files(folder, scene, 1))
-        if (file.parent_path() != folders[1]) folders.push_back(file.parent_path());
-    if (!scene.layers.empty()) folders.push_back(folder.folder / "statistics");
-    return folders;
 }
 
 std::filesystem::path RunFolder::video() const { return folder / "frames" / (name + ".mp4"); }
@@ -268,24 +247,18 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
 
     const auto lock = std::make_shared<const FolderLock>(folder.folder, "run");
     recorder.set_guard([lock] { lock->require_in_place(); });
-    const std::vector<FolderLock> locks_of_parts = lock_parts(folder, settings.scene);
     const Resumption resumption = found();  // once more: another run may have been at work until now
     if (resumption == Resumption::complete) return report_of_complete(settings, folder);
     settings.resume = resumption == Resumption::go_on;
     std::vector<RunInput> inputs = inputs_of(settings);
-    if (!settings.resume) {
-        refuse_to_remove_inputs(folder, inputs);
-        if (!settings.overwrite) refuse_to_lose(folder, settings, inputs, resumption);
-    } else {
-        refuse_to_replace_next_frames(folder, settings);
-    }
-    if (settings.range.last_frame >= settings.range.first_frame) make_density_folders(folder, settings.scene);
-    if (lock->held()) remove_leftovers(folder, settings.scene);
+    const HeldFolders held = hold_folders(folder, settings, inputs, resumption);
+    if (lock->held()) remove_leftovers(folder, held);
     Simulation& simulation =
         made.emplace(settings.resume   ? resumed_simulation(settings, folder, inputs)
                      : settings.branch ? branched_simulation(settings, folder)
                                        : Simulation(settings.scene, settings.range, settings.simulation_hash,
                                                     std::move(settings.initial), settings.results()));
+    if (settings.resume) refuse_to_replace_next_frames(folder, settings);
     // Refuses a mixture: the simulation, the pictures and the checksums read the files at different times.
     if (const auto changed = first_changed(settings.stamps))
         throw Error(ErrorCode::io,

@@ -50,9 +50,6 @@ struct RunFolder {
 std::vector<std::filesystem::path> density_files(const RunFolder& folder, const Scene& scene, int frame);
 std::vector<std::filesystem::path> picture_files(const RunFolder& folder, const Scene& scene, int frame);
 
-// Returns the folders that a run of the scene writes to, those that are not there yet too; each once.
-std::vector<std::filesystem::path> folders_of_run(const RunFolder& folder, const Scene& scene);
-
 // The checkpoint of another run that a run branches off (simulation/branch.h), and by what it is known.
 struct BranchPoint {
     std::filesystem::path checkpoint;  // as the command named it

@@ -47,6 +47,9 @@ void remove_listed(const RunListing& run, const std::set<std::string>& listed,
     std::multimap<std::string, std::filesystem::path> by_name;
     for (const std::string& name : listed)
         by_name.emplace(std::filesystem::path(name).filename().string(), run.folder / name);
+    const RunFolder own{run.folder, run.scene.name};
+    for (const std::filesystem::path& path : {own.manifest(), own.checkpoint()})
+        by_name.emplace(path.filename().string(), path);
     std::erase_if(extra, [&](const std::filesystem::path& path) {
         const auto [begin, end] = by_name.equal_range(path.filename().string());
         return std::any_of(begin, end,

@@ -17,7 +17,9 @@ namespace nephos {
 class Problems {
   public:
     void add(const std::string& text) {
-        if (known_.size() < kKnown && !known_.insert(text).second) return;
+        if (text == last_ || known_.contains(text)) return;
+        last_ = text;
+        if (known_.size() < kKnown) known_.insert(text);
         if (++count_ <= kNamed) text_ += (text_.empty() ? "" : "; ") + text;
     }
     bool none() const { return count_ == 0; }
@@ -30,12 +32,12 @@ class Problems {
 
   private:
     static constexpr std::size_t kNamed = 3;       // problems that are told
-    static constexpr std::size_t kKnown = 10'000;  // and that are compared with others
+    static constexpr std::size_t kKnown = 10'000;  // that are compared with all others
     std::string text() const {
         return count_ > kNamed ? fmt::format("{}; and {} more", text_, count_ - kNamed) : text_;
     }
     std::size_t count_ = 0;
-    std::string text_;
+    std::string text_, last_;
     std::set<std::string> known_;
 };
 

@@ -101,7 +101,10 @@ void put_value(std::string& out, NetcdfType type, double value) {
             put(out, value);
             break;
         default:
-            throw Error(ErrorCode::usage, fmt::format("NetCDF type {}: is read alone", std::uint32_t(type)));
+            throw Error(
+                ErrorCode::usage,
+                fmt::format("NetCDF type {}: cannot be written: expected text, int32, float32 or float64",
+                            std::uint32_t(type)));
     }
 }
 

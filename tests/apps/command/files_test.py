@@ -289,7 +289,7 @@ class Disk(Case):
 
     def test_manifest(self):
         self.refused_at(100, "manifest.json", "run", self.scene, "--no-render", "--out", "out")
-        self.assertEqual([p.name for p in (self.folder / "out").iterdir()], [])
+        self.assertEqual([p for p in (self.folder / "out").rglob("*") if p.is_file()], [])
 
     def test_vdb(self):
         # Larger than manifest and table, smaller than a grid.
