@@ -28,8 +28,8 @@ constexpr std::chrono::milliseconds kRowsAlone{200};
 void follow_document(Editor& editor) {
     if (editor.shown_version == editor.document->version()) return;
     editor.shown_version = editor.document->version();
-    const std::optional<Scene>& scene = editor.document->scene();
-    if (!scene || !editor.document->problems().empty()) return;
+    const Scene* const scene = editor.document->current_scene();
+    if (scene == nullptr) return;
     if (!editor.shown_scene) {
         const double start = scene->frames.enabled ? scene->frames.start_s : 0;
         const Moment moment = moment_of(std::max(0.0, start), scene->automaton.time_step_s);

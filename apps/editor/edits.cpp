@@ -8,6 +8,7 @@
 #include <imgui.h>
 
 #include "apps/editor/state.h"
+#include "apps/editor/wind_level.h"
 
 namespace nephos {
 
@@ -70,15 +71,18 @@ void set_values(Editor& editor, const TextPath& table, const std::vector<TextEnt
     const auto changed = [&](std::string text) {
         for (const auto& [key, value] : entries) {
             path.back().name = key;
-            text = with_value(text, path, value, form);
+            // Of several keys the caller knows the form.
+            text = entries.size() == 1
+                       ? with_value_of_wind(text, editor.document->values(), path, value, form)
+                       : with_value(text, path, value, form);
         }
         return text;
     };
     if (is_kept_from_recording(editor, path)) {
         return say(editor,
                    entries.front().second + " of " + name +
-                       " is not recorded while the text has problems: mend them, or switch \"Record as key "
-                       "frames\" off",
+                       " is not set, as it cannot be recorded while the text has problems: switch "
+                       "\"Record as key frames\" off, or mend them",
                    true);
     }
     bool recorded = false;

@@ -9,6 +9,7 @@
 
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
+#include "apps/editor/wind_level.h"
 #include "core/text.h"
 #include "core/wind.h"
 
@@ -23,21 +24,11 @@ double number_in(const Node& table, std::string_view key) {
     return entry->value.kind == Node::Kind::integer ? double(entry->value.integer) : entry->value.number;
 }
 
-bool is_polar(const Node& level) { return level.find("from_deg") != nullptr || level.find("speed_m_per_s") != nullptr; }
-
-Velocity velocity_of(const Node& level) {
-    if (!is_polar(level)) return {number_in(level, "east_m_per_s"), number_in(level, "north_m_per_s")};
-    const double speed = number_in(level, "speed_m_per_s"), from = number_in(level, "from_deg") * kRadians;
-    return {-speed * std::sin(from), -speed * std::cos(from)};
-}
-
 std::vector<TextEntry> entries_of(const Velocity& v, bool polar) {
     const auto tenth = [](double value) { return number_text(std::round(10 * value) / 10); };
     if (!polar) return {{"east_m_per_s", tenth(v.east_m_per_s)}, {"north_m_per_s", tenth(v.north_m_per_s)}};
-    double from = std::atan2(-v.east_m_per_s, -v.north_m_per_s) / kRadians;
-    if (from < 0) from += 360;
-    return {{"from_deg", number_text(std::round(from))},
-            {"speed_m_per_s", tenth(std::hypot(v.east_m_per_s, v.north_m_per_s))}};
+    return {{"from_deg", number_text(std::round(*value_of_wind(v, "from_deg")))},
+            {"speed_m_per_s", tenth(*value_of_wind(v, "speed_m_per_s"))}};
 }
 
 // Blue for the lowest height, red for the highest.

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "apps/editor/schema_values.h"
+#include "apps/editor/key_frame_text.h"
 #include "apps/editor/state.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -40,51 +40,6 @@ std::vector<WindLevel> profile_at(const Wind& wind, double time_s) {
     std::vector<WindLevel> out;
     for (const double height : heights) out.push_back({height, wind_at(wind, height, time_s)});
     return out;
-}
-
-// A key frame as a text has it: its time, and its other keys.
-struct KeyFrame {
-    double time_s = 0;
-    std::vector<TextEntry> entries;
-};
-
-// Returns the text with other key frames at a path ("wind", "layer[0].wind", "sun.path"); `before`: those that it has. Both rise in
-// time. What stays of them is not touched, nor what their author wrote beside it.
-std::string with_key_frames(std::string text, const TextPath& path, const std::vector<KeyFrame>& before,
-                            const std::vector<KeyFrame>& after) {
-    const auto element = [&](std::size_t n) {
-        TextPath out = path;
-        out.push_back({{}, n});
-        return out;
-    };
-    const auto key_of = [&](std::size_t n, const std::string& name) {
-        TextPath out = element(n);
-        out.push_back({name, 0});
-        return out;
-    };
-    // From the last to the first: the places of those before stay.
-    for (std::size_t old = before.size(), now = after.size(); old > 0 || now > 0;) {
-        const bool is_removed = now == 0 || (old > 0 && before[old - 1].time_s > after[now - 1].time_s);
-        if (is_removed) {
-            text = without(text, element(--old));
-            continue;
-        }
-        const KeyFrame& wanted = after[--now];
-        if (old == 0 || before[old - 1].time_s < wanted.time_s) {
-            std::vector<TextEntry> entries{{"time_s", number_text(wanted.time_s)}};
-            entries.insert(entries.end(), wanted.entries.begin(), wanted.entries.end());
-            text = with_new_element(text, path, entries, old);
-            continue;
-        }
-        const std::vector<TextEntry>& was = before[--old].entries;
-        for (const TextEntry& entry : wanted.entries)
-            if (std::ranges::count(was, entry) == 0)
-                text = with_value(text, key_of(old, entry.first), entry.second);
-        for (const TextEntry& entry : was)
-            if (std::ranges::count(wanted.entries, entry.first, &TextEntry::first) == 0)
-                text = without(text, key_of(old, entry.first));
-    }
-    return text;
 }
 
 std::vector<KeyFrame> key_frames(const std::vector<WindKeyframe>& keys) {
@@ -165,6 +120,13 @@ std::vector<SunKey> sun_with_key(const Scene& scene, SunKey wanted, std::uint64_
         keys.insert(at, wanted);
     }
     return keys;
+}
+
+std::vector<KeyFrame> key_frames(const std::vector<StatePoint>& points) {
+    std::vector<KeyFrame> out;
+    for (const StatePoint& point : points)
+        out.push_back({point.time_s, {{"state", number_text(point.state)}}});
+    return out;
 }
 
 std::vector<KeyFrame> key_frames(const std::vector<SunKey>& keys, const Rgb& colour) {
@@ -421,19 +383,12 @@ void record_climate(Editor& editor, double final_state, double duration_s) {
         if (time > from) points.push_back({time, state_at(time)});
     }
     points.push_back({now + std::max(duration_s, step_s), final_state});
-    std::string schedule = "[";
-    for (const StatePoint& point : points) {
-        if (schedule.size() > 1) schedule += ", ";
-        schedule +=
-            "{ time_s = " + number_text(point.time_s) + ", state = " + number_text(point.state) + " }";
-    }
     const bool done = attempt(editor, [&] {
         std::string text = editor.document->text();
-        for (const char* key :
-             {"climate.initial_state", "climate.final_state", "climate.duration_s", "climate.schedule"}) {
+        for (const char* key : {"climate.initial_state", "climate.final_state", "climate.duration_s"})
             text = without(text, text_path(key));
-        }
-        text = with_value(text, text_path("climate.schedule"), schedule + "]");
+        text = with_key_frames(text, text_path("climate.schedule"), key_frames(scene.climate.schedule),
+                               key_frames(points));
         apply(editor, text, "Climate from step " + std::to_string(held.step), "");
     });
     if (done) say(editor, "The climate changes from step " + std::to_string(held.step) + " on");

@@ -34,7 +34,7 @@ TextPath element_path(const TextPath& array, std::size_t index) {
 
 // Where something new is put: in the middle of the lattice, on its floor.
 Vec3 middle_of(const Editor& editor) {
-    const std::optional<Scene>& scene = editor.document->scene();
+    const std::optional<Scene>& scene = editor.document->last_sound_scene();
     if (!scene) return {0, 0, 1000};
     const bool of_layer = !scene->layers.empty();
     const Extent& cells = of_layer ? scene->layers.front().extent : scene->automaton.extent;
@@ -64,7 +64,7 @@ void choose(Editor& editor, const TextPath& path) {
 }
 
 void add_element(Editor& editor, const Key& list, const TextPath& path) {
-    const std::optional<Scene>& scene = editor.document->scene();
+    const std::optional<Scene>& scene = editor.document->last_sound_scene();
     // Seeds and roots stand in their model's own space.
     const bool in_model = path.size() > 2 && path.front().name == "model";
     const Vec3 place = in_model ? Vec3{} : middle_of(editor);

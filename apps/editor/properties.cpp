@@ -12,6 +12,7 @@
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
 #include "apps/editor/value_controls.h"
+#include "apps/editor/wind_level.h"
 #include "core/error.h"
 #include "scenes/format/text.h"
 
@@ -49,9 +50,13 @@ const Node* default_node(Editor& editor, const Key& key, const TextPath& path) {
     const bool is_in_list =
         std::ranges::any_of(above, [](const TextStep& step) { return step.name.empty(); });
     const Scene* scene = editor.document->current_scene();
-    if (scene == nullptr && editor.document->scene())
-        scene = is_in_list ? &kPlain : &*editor.document->scene();
-    if (scene != nullptr) value = default_value(key, owner_at(*scene, above, models_from_files(editor)));
+    if (scene == nullptr && editor.document->last_sound_scene())
+        scene = is_in_list ? &kPlain : &*editor.document->last_sound_scene();
+    if (const Node* level =
+            level_of_wind(editor.document->values(), path))  // in the form that it is not given in
+        value = number_text(*value_of_wind(velocity_of(*level), key.name), 6);
+    else if (scene != nullptr)
+        value = default_value(key, owner_at(*scene, above, models_from_files(editor)));
     Node& made = editor.defaults[name];  // a table: it has none
     if (!value.empty()) made = parsed_value(value);
     return made.kind == Node::Kind::table ? nullptr : &made;
@@ -286,9 +291,16 @@ std::string text_with_typed(const Editor& editor) {
     const std::string& text = editor.document->text();
     if (editor.document->has_syntax_error()) return text;
     try {
-        if (const auto& recorded = editor.recorded_value)
-            return with_recorded(editor, recorded->path,
-                                 with_value(text, recorded->path, recorded->value, recorded->form));
+        const Node& values = editor.document->values();
+        if (const auto& recorded = editor.recorded_value) {
+            const std::string edited =
+                with_value_of_wind(text, values, recorded->path, recorded->value, recorded->form);
+            try {
+                return with_recorded(editor, recorded->path, edited);
+            } catch (const Error&) {  // it is kept as it would be without recording
+                return edited;
+            }
+        }
         if (!editor.typed) return text;
         const auto& [path, key, value, is_drawn] = *editor.typed;
         if (is_name(path, *key, value)) {
@@ -297,7 +309,7 @@ std::string text_with_typed(const Editor& editor) {
             } catch (const Error&) {  // it would be refused, and is kept as it is
             }
         }
-        return with_value(text, path, value, form_of(*key));
+        return with_value_of_wind(text, values, path, value, form_of(*key));
     } catch (const Error&) {  // the text was changed meanwhile, and has no such place any more
         return text;
     }

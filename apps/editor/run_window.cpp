@@ -68,7 +68,7 @@ void run_window(Editor& editor) {
         if (!editor.run && !is_sound) {
             ImGui::TextWrapped("The scene has problems: they come first.");
         } else if (!editor.run) {
-            ImGui::Text("into out/%s", editor.document->scene()->name.c_str());
+            ImGui::Text("into out/%s", editor.document->current_scene()->name.c_str());
             if (button(editor, "Start the run")) attempt(editor, [&] { start_run(editor); });
         } else {
             const std::scoped_lock lock(editor.run->mutex);

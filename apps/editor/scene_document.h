@@ -38,7 +38,7 @@ class SceneDocument {
     // The values of the text, of its last version without syntax errors.
     const Node& values() const { return values_; }
     // The last text without problems as a scene; none when there was none.
-    const std::optional<Scene>& scene() const { return scene_; }
+    const std::optional<Scene>& last_sound_scene() const { return scene_; }
     const std::vector<Problem>& problems() const { return problems_; }
     // The scene of the text as it is; null while it has problems. What acts on elements of the text takes this one: those of an
     // earlier one may stand elsewhere in it.

@@ -274,7 +274,7 @@ std::optional<std::string> edit_boundaries(const ValueRow& row) {
 // Names that a list of texts may hold: those of models or skies.
 std::vector<std::string> candidates(const Editor& editor, const ValueRow& row) {
     std::vector<std::string> names;
-    const std::optional<Scene>& scene = editor.document->scene();
+    const Scene* const scene = editor.document->current_scene();
     const Node& values = editor.document->values();
     if (row.path.size() < 2) return names;
     if (row.key.name == "models") {

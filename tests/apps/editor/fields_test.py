@@ -492,6 +492,50 @@ class Problems(Kept):
         self.assertEqual(scene.read_text(encoding="utf-8"), kept)
         self.assertTrue(kept.startswith(text), "the key frame that stays, and what its author wrote beside it\n" + kept)
 
+    LEVELS = HEAD + "".join(f"[[wind]] # {name}\ntime_s = {time}\n[[wind.levels]] # low\nheight_m = 1000\nfrom_deg = 250\nspeed_m_per_s = {speed}\n"
+                            for name, time, speed in (("a", 0, 5), ("b", 10, 6), ("c", 60, 7)))
+
+    def test_levels_that_are_sections_are_recorded(self):
+        """At the step of a key frame: it changes, the one before keeps its text; and a signal keeps the same."""
+        scene = self.folder / "w.toml"
+        typed = self.AT_STEP_3 + ('click "tab View"\nclick "Record as key frames"\nclick wind\nclick wind[1]\nclick wind[1].levels\n'
+                 'click wind[1].levels[0]\nclick "tab Properties"\nwait 0.3\ndouble-click-at wind[1].levels[0].speed_m_per_s 0.5 0.5\n'
+                 "key CTRL+A\ntype 12.5\nwait 0.3\n")
+        scene.write_text(self.LEVELS, encoding="utf-8")
+        kept = self.keep_by_signal(scene, typed, signal.SIGTERM)
+        self.edit(scene, script=typed + "key ENTER\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+        self.assertEqual(scene.read_text(encoding="utf-8"), kept)
+        self.assertTrue(kept.startswith(self.LEVELS[:self.LEVELS.index("[[wind]] # b")]), kept)
+        last = tomllib.loads(kept)["wind"][-1]
+        self.assertEqual(last["time_s"], 10)
+        level, = last["levels"]
+        self.assertAlmostEqual((level["east_m_per_s"] ** 2 + level["north_m_per_s"] ** 2) ** 0.5, 12.5, 3)
+
+    def test_a_wind_has_one_form(self):
+        """The fields of the other form show the same wind, and setting one of them changes the level to that form."""
+        choose = 'click wind\nclick wind[0]\nclick wind[0].levels\nclick wind[0].levels[0]\nclick "tab Properties"\nwait 0.3\n'
+        text = self.HEAD + "[[wind]]\nlevels = [{ height_m = 1000, east_m_per_s = 3, north_m_per_s = 4 }] # mine\n"
+        level = "wind[0].levels[0]"
+        for key, value, wanted in (("speed_m_per_s", "14", "from_deg = 216.8698976, speed_m_per_s = 14"), ("from_deg", "270", "from_deg = 270, speed_m_per_s = 5"),
+                                   ("east_m_per_s", "5", "east_m_per_s = 5, north_m_per_s = 4")):
+            saved = self.saved(text, f"{choose}set {level}.{key} {value}\nwait 0.3\n")
+            self.assertEqual(saved, text.replace("east_m_per_s = 3, north_m_per_s = 4", wanted))
+        polar = text.replace("east_m_per_s = 3, north_m_per_s = 4", "from_deg = 270, speed_m_per_s = 5")
+        saved, = tomllib.loads(self.saved(polar, f"{choose}set {level}.north_m_per_s 2\nwait 0.3\n"))["wind"][0]["levels"]
+        self.assertEqual({key: round(value, 6) for key, value in saved.items()}, {"height_m": 1000, "east_m_per_s": 5, "north_m_per_s": 2})
+
+    def test_a_change_of_the_climate_leaves_what_was_before(self):
+        scene = self.folder / "c.toml"
+        schedule = "schedule = [ # states\n  { time_s = 0, state = 0 }, # of 06:00\n  { time_s = 2, state = 0.25 }, # of 07:00\n] # end\n"
+        text = self.HEAD + f"[climate]\n{schedule}" + MODELS[MODELS.index("[[model]]"):]
+        scene.write_text(text, encoding="utf-8")
+        self.edit(scene, script=self.AT_STEP_3 + 'click "tab View"\nwait 0.2\nclick "Start the change now"\nwait 0.5\nkey CTRL+S\nwait 0.5\n')
+        saved = scene.read_text(encoding="utf-8")
+        self.assertIn(schedule[:schedule.index("\n] # end")], saved)
+        self.assertGreater(len(tomllib.loads(saved)["climate"]["schedule"]), 2)
+        done = subprocess.run([NEPHOS, "validate", scene], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr + saved)
+
     def test_a_first_key_frame_leaves_the_others(self):
         """At the time of one that is there only its numbers change; one before the first comes in front of it."""
         at_start = 'click sun\nclick "tab Properties"\nwait 0.3\nkey HOME\nwait 0.4\n'

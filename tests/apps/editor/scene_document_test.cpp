@@ -58,8 +58,8 @@ TEST(SceneDocument, OpenAndSaveOfShippedScenesChangesNoByte) {
         if (entry.path().extension() != ".toml") continue;
         SceneDocument document(entry.path());
         EXPECT_TRUE(document.problems().empty()) << entry.path();
-        ASSERT_TRUE(document.scene()) << entry.path();
-        EXPECT_EQ(*document.scene(), read_scene(entry.path())) << entry.path();
+        ASSERT_TRUE(document.last_sound_scene()) << entry.path();
+        EXPECT_EQ(*document.last_sound_scene(), read_scene(entry.path())) << entry.path();
         const fs::path copy = folder.path / entry.path().filename();
         document.save_as(copy);
         EXPECT_EQ(content(copy), content(entry.path())) << entry.path();
@@ -171,19 +171,19 @@ TEST(SceneDocument, WhatIsTakenBackHasNotBeen) {
 
 TEST(SceneDocument, ProblemsLeaveTheLastGoodScene) {
     SceneDocument document(std::string("[sun]\nelevation_deg = 12\n"));
-    ASSERT_TRUE(document.scene());
+    ASSERT_TRUE(document.last_sound_scene());
     document.edit("[sun]\nelevation_deg = 95\n", "type");
     ASSERT_EQ(document.problems().size(), 1u);
     EXPECT_EQ(document.problems()[0].where.line, 2);
     EXPECT_EQ(document.problems()[0].caret, 17);
-    EXPECT_EQ(document.scene()->render.sun.elevation_deg, 12);
+    EXPECT_EQ(document.last_sound_scene()->render.sun.elevation_deg, 12);
     document.edit("[sun\n", "type");
     EXPECT_EQ(document.problems().size(), 1u);
     EXPECT_NE(value_node(document.values(), text_path("sun.elevation_deg")),
               nullptr);  // the last that could be read
     document.edit("[sun]\nelevation_deg = 13\n", "type");
     EXPECT_TRUE(document.problems().empty());
-    EXPECT_EQ(document.scene()->render.sun.elevation_deg, 13);
+    EXPECT_EQ(document.last_sound_scene()->render.sun.elevation_deg, 13);
 }
 
 TEST(SceneDocument, SeesWhatOtherProgramsDoToItsFile) {
@@ -194,7 +194,7 @@ TEST(SceneDocument, SeesWhatOtherProgramsDoToItsFile) {
     EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::same);
     write(path, "seed = 2\n");
     EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::reloaded);
-    EXPECT_EQ(document.scene()->automaton.seed, 2u);
+    EXPECT_EQ(document.last_sound_scene()->automaton.seed, 2u);
     EXPECT_FALSE(document.is_modified());
     document.undo();
     EXPECT_EQ(document.text(), "seed = 1\n");
@@ -202,7 +202,7 @@ TEST(SceneDocument, SeesWhatOtherProgramsDoToItsFile) {
     write(path, "seed = two\n");  // with a problem: shown, the last good scene stays
     EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::reloaded);
     EXPECT_EQ(document.problems().size(), 1u);
-    EXPECT_EQ(document.scene()->automaton.seed, 2u);
+    EXPECT_EQ(document.last_sound_scene()->automaton.seed, 2u);
     document.edit("seed = 3\n", "mine");
     write(path, "seed = 44\n");
     EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::differs);
@@ -459,8 +459,8 @@ TEST(SceneDocument, SyntaxErrorsAreToldFromOtherProblems) {
     document.edit("sea = 1\n", "type");
     EXPECT_FALSE(document.has_syntax_error());
     EXPECT_FALSE(document.problems().empty());
-    ASSERT_TRUE(document.scene());  // the last good one
-    EXPECT_EQ(document.scene()->automaton.seed, 1u);
+    ASSERT_TRUE(document.last_sound_scene());  // the last good one
+    EXPECT_EQ(document.last_sound_scene()->automaton.seed, 1u);
 }
 
 TEST(SceneDocument, SavingWhereItCannotKeepsTheEdits) {
@@ -478,7 +478,7 @@ TEST(SchemaValues, NewElementsHaveTheirRequiredKeys) {
         const TextPath at = text_path(path);
         const Key* key = key_at(at);
         EXPECT_NE(key, nullptr) << path;
-        const std::optional<Scene>& scene = document.scene();
+        const std::optional<Scene>& scene = document.last_sound_scene();
         return with_new_element(
             text, at, new_element(*key, document.values(), at, scene ? &*scene : nullptr, {0, 0, 1000}));
     };
@@ -541,7 +541,7 @@ TEST(SchemaValues, RenamingToATakenNameIsRefused) {
 
 TEST(SchemaValues, OwnersAndDefaults) {
     const SceneDocument document(fs::path(NEPHOS_SOURCE_DIR) / "scenes/climate.toml");
-    const Scene& scene = *document.scene();
+    const Scene& scene = *document.last_sound_scene();
     const TextPath layer = text_path("layer[1]");
     EXPECT_EQ(owner_at(scene, layer, 0), &scene.layers[1]);
     EXPECT_EQ(owner_at(scene, text_path("layer[0].rain.finder"), 0) == nullptr, false);
