@@ -36,10 +36,10 @@ class CheckedArchive : public openvdb::io::Archive {
 // Geometry of a grid: all of a file share it, but for that of the wind over large boxes.
 struct GridGeometry {
     Extent voxels;
-    int refine = 1;       // voxels per cell and axis
+    int refine = 1;       // voxels per cell and axis; 1, too, where a voxel is larger than a cell
     Placement placement;  // of the voxels
-    double shift_voxels = 0;  // of the file's places to those, along each axis
-    int coarser = 1;          // edge of the voxels, in those of density
+    double shift_voxels = 0;  // added to the places that are written, along each axis, in voxels of this grid
+    int density_voxels_edge = 1;  // edge of a voxel of this grid, in voxels of density
 };
 
 void check_plane(const std::optional<BitPlaneView>& plane, std::optional<Extent>& cells) {
@@ -180,19 +180,20 @@ GridGeometry geometry_of_wind(const GridGeometry& density) {
     const auto fewer = [&](int n) { return (n + edge - 1) / edge; };
     wind.voxels = {fewer(density.voxels.x), fewer(density.voxels.y), fewer(density.voxels.z)};
     wind.placement.cell_size_m *= edge;
-    wind.coarser = edge;
+    wind.density_voxels_edge = edge;
     // Of coarser voxels there are fewer to a cell, or a cell is less than one of them.
     wind.refine = density.refine % edge == 0 ? density.refine / edge : 1;
     return wind;
 }
 
-// The velocities at the middle of the levels of the wind: of larger voxels between two levels of the density.
+// The velocities at the middle of the levels of the wind: of larger voxels between two levels of the density, of those that reach beyond
+// the box in the middle of what lies in it.
 std::vector<openvdb::Vec3s> profile_of(const std::vector<Velocity>& levels, int edge, int count) {
     std::vector<openvdb::Vec3s> profile;
     for (int n = 0; n < count; ++n) {
-        const std::size_t last = levels.size() - 1, upper = std::min(last, std::size_t(n * edge + edge / 2)),
-                          lower = std::min(last, std::size_t(n * edge + (edge - 1) / 2));
-        const Velocity &a = levels[lower], &b = levels[upper];
+        const std::size_t first = std::size_t(n * edge),
+                          last = std::min(first + std::size_t(edge), levels.size()) - 1;
+        const Velocity &a = levels[(first + last) / 2], &b = levels[(first + last + 1) / 2];
         profile.emplace_back(float((a.east_m_per_s + b.east_m_per_s) / 2),
                              float((a.north_m_per_s + b.north_m_per_s) / 2), 0.0f);
     }
@@ -204,7 +205,8 @@ VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& den
                               const GridGeometry& geometry) {
     if (content.wind.size() != std::size_t(density.voxels.z))
         throw Error(ErrorCode::usage, "a VDB file needs one velocity of the wind a level of voxels");
-    const std::vector<openvdb::Vec3s> profile = profile_of(content.wind, geometry.coarser, geometry.voxels.z);
+    const std::vector<openvdb::Vec3s> profile =
+        profile_of(content.wind, geometry.density_voxels_edge, geometry.voxels.z);
     auto grid = VectorGrid::create(openvdb::Vec3s(0.0f));
     grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
     openvdb::tree::ValueAccessor<VectorTree> accessor(grid->tree());

@@ -87,7 +87,7 @@ const Section& thermals_section() {
         "Makes each ellipsoid the base of a plume: thermals as high as it leave it one after the other, "
         "rise, slow "
         "down, lean with the shear of the wind, and die. `fade_in_s` and `fade_out_s` are those of each of "
-        "them, the "
+        "them (those of a plume that entered from upwind come at full strength, as it did), the "
         "scatter's `life_s` is the plume's. With its centre on the bottom of the lattice, the condensation "
         "level, the "
         "base is flat: nothing is born below it.",

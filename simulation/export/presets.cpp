@@ -87,8 +87,8 @@ constexpr const char* kCigi =
 
 constexpr const char* kFlightgear =
     "FlightGear (not tried in FlightGear; report what differs)\n\n"
-    "The weather, all versions: fgfs --metar=\"$(head -n 1 {NAME}.metar.txt)\" with the aerodrome's letters in "
-    "the place of ZZZZ.\n\n"
+    "The weather, all versions: fgfs --metar=\"$(head -n 1 {NAME}.metar.txt)\" with the aerodrome's letters where "
+    "it has ZZZZ.\n\n"
     "A cloud, versions after 2024: {FIRST} is the largest cloud of its frame. Copy it into Textures/Sky of the "
     "data\n"
     "folder, and name it as a <voxel-texture> of a cloud in Environment/cloudlayers.xml. A voxel of the picture is "
