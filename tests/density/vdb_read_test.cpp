@@ -131,6 +131,7 @@ TEST(VdbRead, PlacesKeepEveryDigit) {
             EXPECT_EQ(fog.placement().cell_size_m, size);
             VdbContent content;
             content.density = &fog;
+            content.cells = fog.placement();
             write_vdb(folder / "own.vdb", content, {});
             const Placement again = load_density(folder / "own.vdb").density.placement();
             EXPECT_EQ(again.cell_size_m, size) << first;
