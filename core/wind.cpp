@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "core/text.h"
 
 namespace nephos {
@@ -37,6 +38,11 @@ std::int64_t to_fixed(double cells) {
 }
 
 }  // namespace
+
+Velocity velocity_from(double from_deg, double speed_m_per_s) {
+    const Rotation from = sin_cos_deg(from_deg);
+    return {0.0 - speed_m_per_s * from.sin, 0.0 - speed_m_per_s * from.cos};
+}
 
 Velocity wind_at(const Wind& wind, double height_m, double time_s) {
     const auto& keys = wind.keyframes;

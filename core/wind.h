@@ -45,6 +45,10 @@ struct Wind {
     bool operator==(const Wind&) const = default;
 };
 
+// Returns the wind that comes from a direction, degrees clockwise from north. The same bits on every machine: the velocity decides
+// those of the simulation. Pure.
+Velocity velocity_from(double from_deg, double speed_m_per_s);
+
 // Returns true when there is neither a profile nor a field.
 inline bool is_calm(const Wind& wind) { return wind.keyframes.empty() && wind.fields.empty(); }
 

@@ -181,6 +181,22 @@ Simulation branched_simulation(const RunSettings& settings, const RunFolder& fol
     }
 }
 
+void refuse_to_remove_other_run(const RunSettings& settings,
+                                const std::vector<std::filesystem::path>& files) {
+    const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
+    std::vector<std::filesystem::path> needed{settings.branch->checkpoint, parent.statistics()};
+    for (const LayerOptions& layer : settings.scene.layers) needed.push_back(parent.statistics(layer.name));
+    for (const std::filesystem::path& each : needed) {
+        const auto found = std::ranges::find_if(
+            files, [&](const std::filesystem::path& file) { return is_same_place(file, each); });
+        if (found == files.end()) continue;
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: is {} of the run to branch off, and would be replaced: choose "
+                                "another --out",
+                                found->string(), each.string()));
+    }
+}
+
 void require_tables_of_other_run(const RunSettings& settings, std::uint64_t steps) {
     const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
     if (is_there(parent.manifest())) {

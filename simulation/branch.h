@@ -38,6 +38,9 @@ std::string scene_text_beside(const std::filesystem::path& from);
 // the other run.
 Simulation branched_simulation(const RunSettings& settings, const RunFolder& folder);
 
+// Throws Error(usage) where one of `files`, which the branch takes the place of, is a table of the other run, by links.
+void refuse_to_remove_other_run(const RunSettings& settings, const std::vector<std::filesystem::path>& files);
+
 // Throws Error(io) unless the other run's statistics, of all layers too, have the rows of all steps before `steps`.
 void require_tables_of_other_run(const RunSettings& settings, std::uint64_t steps);
 // Copies these rows into the folder of the branch. Throws Error(io).

@@ -32,11 +32,6 @@ void remove_file(const std::filesystem::path& path) {
     if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
 }
 
-bool is_link(const std::filesystem::path& path) {
-    std::error_code error;
-    return std::filesystem::is_symlink(path, error);
-}
-
 // Parts of the folder that hold frames: a folder of its own for the densities of each layer.
 std::vector<std::string> frame_parts(const RunFolder& folder) {
     std::vector<std::string> parts{"density", "frames"};
@@ -59,32 +54,6 @@ std::string earlier_name(const RunFolder& folder) {
     } catch (const Error&) {
         return {};
     }
-}
-
-// Lists the files of a run of this name, and of the one in the folder, that are there already, the manifest last: as long as
-// it is there, the rest is known to be of a run.
-std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
-    std::vector<std::filesystem::path> files;
-    std::vector<std::string> names{folder.name};
-    if (const std::string earlier = earlier_name(folder); !earlier.empty() && earlier != folder.name)
-        names.push_back(earlier);
-    for (const std::string& part : frame_parts(folder)) {
-        for (const std::string& file : names_in_folder(folder.folder / part)) {
-            if (std::ranges::any_of(names, [&](const std::string& name) { return is_frame_of(file, name); }))
-                files.push_back(folder.folder / part / file);
-        }
-    }
-    for (const std::string& name : names_in_folder(folder.folder / "statistics")) {
-        if (!published_name(name).empty()) continue;  // the leftover of a run that was killed
-        const std::filesystem::path path = folder.folder / "statistics" / name;
-        if (is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
-    }
-    std::vector<std::filesystem::path> others{folder.checkpoint(), folder.statistics()};
-    for (const std::string& name : names) others.push_back(RunFolder{folder.folder, name}.video());
-    others.push_back(folder.manifest());
-    for (const std::filesystem::path& path : others)
-        if (stands_there(path)) files.push_back(path);
-    return files;
 }
 
 [[noreturn]] void refuse(const RunFolder& folder, const std::string& reason) {
@@ -115,13 +84,12 @@ EarlierRun manifest_of_run(const RunFolder& folder) {
 // Returns whether a new run of the same scene makes all files of an earlier one again.
 bool makes_again(const EarlierRun& earlier, const RunSettings& settings) {
     const SimulationRange &then = earlier.range, &now = settings.range;
-    const bool has_frames = then.last_frame >= then.first_frame;
     return now.last_step >= then.last_step && (settings.render || !earlier.render) &&
-           (!has_frames || (now.first_frame <= then.first_frame && now.last_frame >= then.last_frame));
+           (!then.has_frames() || (now.first_frame <= then.first_frame && now.last_frame >= then.last_frame));
 }
 
 std::string range_text(const EarlierRun& run) {
-    if (run.range.last_frame < run.range.first_frame) return "statistics alone";
+    if (!run.range.has_frames()) return "statistics alone";
     return fmt::format("frames {}..{}{}", run.range.first_frame, run.range.last_frame,
                        run.render ? "" : ", without pictures");
 }
@@ -238,39 +206,51 @@ SimulationRange range_before(const RunSettings& settings, const Scene& before) {
     };
     if (settings.range == full(settings.scene)) return full(before);
     SimulationRange range = settings.range;
-    if (range.last_frame < range.first_frame) range.last_step = before.steps;
+    if (!range.has_frames()) range.last_step = before.steps;
     return range;
 }
 
 }  // namespace
 
-void remove_earlier_run(const RunFolder& folder) {
-    for (const std::filesystem::path& path : earlier_files(folder)) remove_file(path);
-}
-
-std::vector<std::filesystem::path> folders_of_earlier_files(const RunFolder& folder) {
-    std::vector<std::filesystem::path> folders;
-    for (const std::filesystem::path& file : earlier_files(folder)) folders.push_back(file.parent_path());
-    std::ranges::sort(folders);
-    folders.erase(std::unique(folders.begin(), folders.end()), folders.end());
-    return folders;
-}
-
-void remove_leftovers(const RunFolder& folder, const HeldFolders& held) {
-    const auto is_own = [&](const std::filesystem::path& part) {
-        std::filesystem::path way = folder.folder;
-        bool has_link = false;
-        for (const std::filesystem::path& name : part) has_link = has_link || is_link(way /= name);
-        return !has_link || held.holds(way);
-    };
-    const auto remove_if = [&](const std::filesystem::path& part, const auto& is_ours) {
-        if (!is_own(part)) return;
-        for (const std::string& name : names_in_folder(folder.folder / part)) {
-            const std::string published = published_name(name);
-            if (!published.empty() && is_ours(published)) remove_file(folder.folder / part / name);
+std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
+    std::vector<std::filesystem::path> files;
+    std::vector<std::string> names{folder.name};
+    if (const std::string earlier = earlier_name(folder); !earlier.empty() && earlier != folder.name)
+        names.push_back(earlier);
+    for (const std::string& part : frame_parts(folder)) {
+        for (const std::string& file : names_in_folder(folder.folder / part)) {
+            if (std::ranges::any_of(names, [&](const std::string& name) { return is_frame_of(file, name); }))
+                files.push_back(folder.folder / part / file);
         }
+    }
+    for (const std::string& name : names_in_folder(folder.folder / "statistics")) {
+        if (!published_name(name).empty()) continue;  // the leftover of a run that was killed
+        const std::filesystem::path path = folder.folder / "statistics" / name;
+        if (is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
+    }
+    std::vector<std::filesystem::path> others{folder.checkpoint(), folder.statistics()};
+    for (const std::string& name : names) others.push_back(RunFolder{folder.folder, name}.video());
+    others.push_back(folder.manifest());
+    for (const std::filesystem::path& path : others)
+        if (stands_there(path)) files.push_back(path);
+    return files;
+}
+
+void remove_files(const std::vector<std::filesystem::path>& files) {
+    for (const std::filesystem::path& path : files) remove_file(path);
+}
+
+void remove_leftovers(const RunFolder& folder, HeldFolders& held) {
+    const auto remove_if = [&](const std::filesystem::path& part, const auto& is_ours) {
+        const std::filesystem::path place = part.empty() ? folder.folder : folder.folder / part;
+        std::vector<std::filesystem::path> leftovers;
+        for (const std::string& name : names_in_folder(place)) {
+            const std::string published = published_name(name);
+            if (!published.empty() && is_ours(published)) leftovers.push_back(place / name);
+        }
+        if (!leftovers.empty() && held.can_hold(place)) remove_files(leftovers);
     };
-    remove_if("", [&](const std::string& name) {
+    remove_if({}, [&](const std::string& name) {
         return name == folder.manifest().filename() || name == folder.checkpoint().filename() ||
                name == folder.statistics().filename();
     });
@@ -281,13 +261,14 @@ void remove_leftovers(const RunFolder& folder, const HeldFolders& held) {
     for (const std::string& part : frame_parts(folder)) remove_if(part, is_frame);
 }
 
-void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs) {
+void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<std::filesystem::path>& files,
+                             const std::vector<RunInput>& inputs) {
     std::map<FileIdentity, const RunInput*> begins_with;
     for (const RunInput& input : inputs)
         if (const auto identity = identity_behind(path_of(folder.folder, input.path)))
             begins_with[*identity] = &input;
     if (begins_with.empty()) return;
-    for (const std::filesystem::path& file : earlier_files(folder)) {
+    for (const std::filesystem::path& file : files) {
         const std::optional<FileIdentity> identity = identity_behind(file);
         const auto found = identity ? begins_with.find(*identity) : begins_with.end();
         if (found == begins_with.end()) continue;
@@ -299,27 +280,44 @@ void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput
 
 void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& settings) {
     const EarlierRun earlier = read_manifest(folder.manifest());
-    if (!earlier.complete) return;
+    if (!earlier.complete) {
+        if (earlier.frames_hash.empty()) return;  // of an earlier version
+        for (const std::filesystem::path& file : earlier_files(folder)) {
+            const bool is_place =
+                is_frame_place(folder, settings.scene, settings.range, settings.render, file);
+            if (is_place && !names_hash(file, earlier.frames_hash))
+                throw Error(
+                    ErrorCode::usage,
+                    fmt::format(
+                        "{}: is of another run, or of none, and has the place of a frame of this one: "
+                        "move it away, or start anew with --overwrite",
+                        file.string()));
+        }
+        return;
+    }
     const SimulationRange next{.last_step = settings.range.last_step,
                                .first_frame = earlier.range.last_frame + 1,
                                .last_frame = settings.range.last_frame};
-    for (const std::filesystem::path& file : earlier_files(folder)) {
-        if (!is_frame_place(folder, settings.scene, next, settings.render, file)) continue;
-        throw Error(ErrorCode::usage,
-                    fmt::format("{}: would be replaced by the next frame of the run, which has not written it: "
-                                "move it away, or start anew with --overwrite",
-                                file.string()));
-    }
-    if (next.last_frame < next.first_frame || !stands_there(folder.video())) return;
-    if (const auto why = OwnFiles(folder.folder, earlier, settings.scene).why_foreign(folder.video()))
-        refuse(folder, *why);
+    const auto refuse_file = [](const std::filesystem::path& file, const char* as) {
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: would be replaced by {} of the run, which has not written it: move it away, or "
+                        "start anew with --overwrite",
+                        file.string(), as));
+    };
+    for (const std::filesystem::path& file : earlier_files(folder))
+        if (is_frame_place(folder, settings.scene, next, settings.render, file))
+            refuse_file(file, "the next frame");
+    const bool makes_video = next.has_frames() && settings.render && wants_video(settings.scene);
+    if (makes_video && stands_there(folder.video()) &&
+        OwnFiles(folder.folder, earlier, settings.scene).why_foreign(folder.video()))
+        refuse_file(folder.video(), "the video");
 }
 
-void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
-                    Resumption found) {
+void refuse_to_lose(const RunFolder& folder, const std::vector<std::filesystem::path>& files,
+                    const RunSettings& settings, const std::vector<RunInput>& inputs, Resumption found) {
     for (const LayerOptions& layer : settings.scene.layers)
         refuse_foreign_table(folder, folder.statistics(layer.name), kLayerStatisticsHeader);
-    const std::vector<std::filesystem::path> files = earlier_files(folder);
     if (files.empty()) return;
     if (files.back() != folder.manifest()) {
         refuse(folder, fmt::format("there is {}, but no manifest.json that says that it is of a run",
@@ -356,7 +354,8 @@ Resumption find_resumption(const RunSettings& settings, const RunFolder& folder)
     if (!std::filesystem::exists(folder.manifest())) return Resumption::nothing_there;
     const EarlierRun earlier = read_manifest(folder.manifest());
     const Scene before = scene_before(earlier, settings, folder);
-    const bool same = earlier.range == settings.range && earlier.render == settings.render;
+    const bool same =
+        earlier.range == settings.range && earlier.render == settings.render;  // without frames neither draws
     if (same && earlier.complete && settings.statistics_only) return Resumption::complete;
     if (!same && earlier.range != range_before(settings, before))
         refuse(folder, "it holds a run of the same scene for " + range_text(earlier));
@@ -378,7 +377,8 @@ Simulation resumed_simulation(const RunSettings& settings, const RunFolder& fold
     refuse_other_pictures(earlier, inputs, folder);
     const SimulationRange range = range_before(settings, before);
     const EarlierRun now{.render = settings.render, .range = range};
-    if (earlier.range != range || earlier.render != settings.render) {
+    // One that had no frame yet has said nothing of its pictures.
+    if (earlier.range != range || (range.has_frames() && earlier.render != settings.render)) {
         throw Error(
             ErrorCode::usage,
             fmt::format(

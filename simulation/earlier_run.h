@@ -17,16 +17,16 @@
 
 namespace nephos {
 
-// Removes an earlier run's files, which must not stay between those of a new one: those of the same name, and of the name that
-// its manifest has; nothing else is touched. Throws Error(io).
-void remove_earlier_run(const RunFolder& folder);
+// Lists the files of a run of this name, and of the one in the folder, that are there already, which must not stay between those of a
+// new one; the manifest last: as long as it is there, the rest is known to be of a run. Throws ReadFailure.
+std::vector<std::filesystem::path> earlier_files(const RunFolder& folder);
 
-// Returns the folders that hold files of an earlier run, as remove_earlier_run() removes them. Throws ReadFailure.
-std::vector<std::filesystem::path> folders_of_earlier_files(const RunFolder& folder);
+// Removes them, in this order. Throws Error(io).
+void remove_files(const std::vector<std::filesystem::path>& files);
 
-// Removes the temporary files of a run that was killed, in the folders that are held and in those that no link leads to. Only for the
-// holder of the folder's lock: to nobody else are they leftovers. Throws Error(io).
-void remove_leftovers(const RunFolder& folder, const HeldFolders& held);
+// Removes the temporary files of a run that was killed, in the folders that can be held: where another run is at work they are no
+// leftovers. Throws Error(io).
+void remove_leftovers(const RunFolder& folder, HeldFolders& held);
 
 // What `--resume` finds in a folder.
 enum class Resumption {
@@ -38,18 +38,18 @@ enum class Resumption {
 
 // Throws Error(usage) when a new run would overwrite something that it cannot make again: an interrupted run,
 // which may hold hours of work, a run of another scene, or a file that no run wrote.
-// `inputs`: the files that the scene names, as they are now. `found`: what --resume found, or nothing_there: then a run of the
+// `files`: earlier_files(). `inputs`: the files that the scene names, as they are now. `found`: what --resume found, or nothing_there: then a run of the
 // same scene with fewer steps is another one.
-void refuse_to_lose(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
-                    Resumption found);
+void refuse_to_lose(const RunFolder& folder, const std::vector<std::filesystem::path>& files,
+                    const RunSettings& settings, const std::vector<RunInput>& inputs, Resumption found);
 
-// Throws Error(usage) when a run that begins would remove one of the files that it begins with, as a frame of the run that
-// is in the folder.
-void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<RunInput>& inputs);
+// Throws Error(usage) when one of the earlier `files` is one that the run begins with, as a frame of the run that is in the folder.
+void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<std::filesystem::path>& files,
+                             const std::vector<RunInput>& inputs);
 
 // Throws Error(usage) when a complete run that is lengthened would replace a file that is called like one of its next frames, or as
 // its video, which is made anew.
-// After an interruption such files may be its own: they are made again.
+// After an interruption such files may be its own, which are made again: then when one is of another scene, or none of a run.
 void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& settings);
 
 // Throws Error(usage) when the folder holds a run of another scene, Error(io) when its manifest cannot be read.

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "core/descriptor.h"
 #include "core/paths.h"
 #include "simulation/run_listing.h"
 #include "simulation/run_parts.h"
@@ -50,10 +51,15 @@ bool is_frame_place(const RunFolder& folder, const Scene& scene, const Simulatio
            (pictures && std::ranges::count(picture_files(folder, scene, number), file) > 0);
 }
 
+bool names_hash(const std::filesystem::path& file, const std::string& hash) {
+    constexpr std::size_t kMostOfMetadata = 16384;
+    return type_behind(file) == std::filesystem::file_type::regular &&
+           read_beginning(file, kMostOfMetadata).find(hash) != std::string::npos;
+}
+
 OwnFiles::OwnFiles(const std::filesystem::path& folder, EarlierRun run, const Scene& scene)
     : folder_{folder, run.name}, run_(std::move(run)), scene_(scene) {
-    const bool frames = run_.range.last_frame >= run_.range.first_frame;
-    std::vector<std::filesystem::path> parts = parts_of_run(folder_, scene, frames, run_.render);
+    std::vector<std::filesystem::path> parts = parts_of_run(folder_, scene, run_.range, run_.render);
     parts.push_back(folder);
     for (const std::filesystem::path& part : parts)
         if (const std::optional<FileIdentity> identity = identity_behind(part))
@@ -66,7 +72,7 @@ OwnFiles::OwnFiles(const std::filesystem::path& folder, EarlierRun run, const Sc
     for (const ListedFrame& frame : listing.frames) add(frame.files);
     lists_frames_ = !listed_.empty() || listing.frames.empty();
     add(listing.run_files);
-    lists_others_ = !listing.run_files.empty();
+    lists_tables_and_video_ = !listing.run_files.empty();
 }
 
 bool OwnFiles::is_place(const std::filesystem::path& file) const {
@@ -81,7 +87,7 @@ bool OwnFiles::is_place(const std::filesystem::path& file) const {
 
 bool OwnFiles::is_own_path(const std::filesystem::path& file) const {
     const bool is_listed_kind =
-        is_frame_of(file.filename().string(), folder_.name) ? lists_frames_ : lists_others_;
+        is_frame_of(file.filename().string(), folder_.name) ? lists_frames_ : lists_tables_and_video_;
     if (is_listed_kind) return listed_.contains(file.lexically_relative(folder_.folder).generic_string());
     return is_place(file);
 }
@@ -100,14 +106,16 @@ std::optional<std::string> OwnFiles::why_foreign(const std::filesystem::path& fi
     const std::optional<std::filesystem::path> own = own_path(file);
     const std::string path = own.value_or(file).lexically_relative(folder_.folder).generic_string();
     if (!own) return fmt::format("there is {}, which the run in it has not written", path);
-    const bool is_layers = file.parent_path() != folder_.folder;
+    const bool is_layers = own->parent_path() != folder_.folder;
     if (path.ends_with(".csv") &&
         is_begun_statistics(*own, is_layers ? kLayerStatisticsHeader : kStatisticsHeader))
         return std::nullopt;  // nothing is in it
     const auto listed = listed_.find(path);
     const auto table = std::ranges::find(run_.tables, path, &FileRecord::path);
+    const bool is_frame = is_frame_of(own->filename().string(), folder_.name) && !run_.frames_hash.empty();
     const bool is_right = listed != listed_.end()      ? has_content(*own, listed->second, true)
                           : table != run_.tables.end() ? has_content(*own, table->digest, false)
+                          : is_frame                   ? names_hash(*own, run_.frames_hash)
                                                        : true;
     if (is_right) return std::nullopt;
     return fmt::format("{} is not what the run in it has written", path);

@@ -141,26 +141,35 @@ bool encode(const Simulation& simulation, RunRecorder& recorder, const RunSettin
     return true;
 }
 
+// What a run holds of its folder while it is at work, and the earlier files that it takes the place of.
+struct Claim {
+    HeldFolders held;
+    std::vector<std::filesystem::path> replaced;
+};
+
 // Makes sure that nothing is lost where the run is to write, that it is there, and that nobody else writes there. Throws as
 // run_scene().
-HeldFolders hold_folders(const RunFolder& folder, const RunSettings& settings,
-                         const std::vector<RunInput>& inputs, Resumption found) {
-    const bool has_frames = settings.range.last_frame >= settings.range.first_frame;
-    HeldFolders held(folder.folder);
-    const auto hold_parts = [&] {
-        for (const std::filesystem::path& part :
-             parts_of_run(folder, settings.scene, has_frames, settings.render))
-            held.hold(part);
-    };
-    hold_parts();  // before they are looked at
+Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
+                   Resumption found, const FolderLock& lock) {
+    Claim claim{HeldFolders(folder.folder, lock), {}};
+    const std::vector<std::filesystem::path> parts =
+        parts_of_run(folder, settings.scene, settings.range, settings.render);
+    for (const std::filesystem::path& part : parts) claim.held.hold(part);  // before they are looked at
     if (!settings.resume) {
-        for (const std::filesystem::path& part : folders_of_earlier_files(folder)) held.hold(part);
-        refuse_to_remove_inputs(folder, inputs);
-        if (!settings.overwrite) refuse_to_lose(folder, settings, inputs, found);
+        for (bool is_more = true; is_more;) {
+            is_more = false;
+            claim.replaced = earlier_files(folder);
+            for (const std::filesystem::path& file : claim.replaced)
+                is_more = claim.held.hold(file.parent_path()) || is_more;
+        }
+        refuse_to_remove_inputs(folder, claim.replaced, inputs);
+        if (settings.branch) refuse_to_remove_other_run(settings, claim.replaced);
+        if (!settings.overwrite) refuse_to_lose(folder, claim.replaced, settings, inputs, found);
     }
-    make_parts(folder, settings.scene, has_frames, settings.render);
-    hold_parts();  // those that are new
-    return held;
+    for (const std::filesystem::path& part : parts) create_folders(part);
+    if (settings.range.has_frames()) refuse_shared_density_folders(folder, settings.scene);
+    for (const std::filesystem::path& part : parts) claim.held.hold(part);  // those that are new
+    return claim;
 }
 
 }  // namespace
@@ -233,8 +242,7 @@ SimulationResults RunSettings::results() const {
 RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     const Clock::time_point begin = Clock::now();
     if (settings.statistics_only) settings.range = {settings.scene.steps, 1, 0};
-    settings.render = settings.render && wants_pictures(settings.scene) &&
-                      settings.range.last_frame >= settings.range.first_frame;
+    settings.render = settings.render && wants_pictures(settings.scene) && settings.range.has_frames();
     const RunFolder folder{settings.folder, settings.scene.name};
     if (settings.render && wants_video(settings.scene)) require_ffmpeg();
     const bool may_resume = settings.resume;
@@ -251,8 +259,8 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     if (resumption == Resumption::complete) return report_of_complete(settings, folder);
     settings.resume = resumption == Resumption::go_on;
     std::vector<RunInput> inputs = inputs_of(settings);
-    const HeldFolders held = hold_folders(folder, settings, inputs, resumption);
-    if (lock->held()) remove_leftovers(folder, held);
+    Claim claim = claim_folder(folder, settings, inputs, resumption, *lock);
+    remove_leftovers(folder, claim.held);
     Simulation& simulation =
         made.emplace(settings.resume   ? resumed_simulation(settings, folder, inputs)
                      : settings.branch ? branched_simulation(settings, folder)
@@ -273,9 +281,9 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         if (!was_complete) recorder.write_manifest(false, seconds_since(begin));
         recorder.cut_tables();
     } else if (settings.branch) {
-        recorder.begin_branch(simulation);
+        recorder.begin_branch(simulation, claim.replaced);
     } else {
-        remove_earlier_run(folder);
+        remove_files(claim.replaced);
         recorder.begin();
     }
     recorder.start_video(simulation, observer.stop);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/run_parts.h"
 
-#include <algorithm>
-#include <map>
 #include <optional>
 
 #include <fmt/format.h>
@@ -10,29 +8,32 @@
 #include "core/error.h"
 
 namespace nephos {
+namespace {
 
-std::vector<std::filesystem::path> parts_of_run(const RunFolder& folder, const Scene& scene, bool frames,
-                                                bool pictures) {
+std::vector<std::filesystem::path> density_folders(const RunFolder& folder, const Scene& scene) {
+    std::vector<std::filesystem::path> folders;
+    constexpr int kAnyFrame = 1;
+    for (const std::filesystem::path& file : density_files(folder, scene, kAnyFrame))
+        folders.push_back(file.parent_path());
+    return folders;
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> parts_of_run(const RunFolder& folder, const Scene& scene,
+                                                const SimulationRange& range, bool pictures) {
     std::vector<std::filesystem::path> parts;
-    const auto add = [&](const std::filesystem::path& part) {
-        if (std::ranges::count(parts, part) == 0) parts.push_back(part);
-    };
-    if (frames)
-        for (const std::filesystem::path& file : density_files(folder, scene, 1)) add(file.parent_path());
-    if (frames && pictures) add(folder.folder / "frames");
-    if (!scene.layers.empty()) add(folder.folder / "statistics");
+    if (range.has_frames()) parts = density_folders(folder, scene);
+    if (range.has_frames() && pictures) parts.push_back(folder.folder / "frames");
+    if (!scene.layers.empty()) parts.push_back(folder.folder / "statistics");
     return parts;
 }
 
-void make_parts(const RunFolder& folder, const Scene& scene, bool frames, bool pictures) {
-    for (const std::filesystem::path& part : parts_of_run(folder, scene, frames, pictures))
-        create_folders(part);
-    if (!frames) return;
+void refuse_shared_density_folders(const RunFolder& folder, const Scene& scene) {
     std::map<FileIdentity, std::filesystem::path> known;
-    for (const std::filesystem::path& file : density_files(folder, scene, 1)) {
-        const std::filesystem::path each = file.parent_path();
+    for (const std::filesystem::path& each : density_folders(folder, scene)) {
         const std::optional<FileIdentity> identity = identity_behind(each);
-        if (!identity) continue;  // removed meanwhile, which whoever writes there will find
+        if (!identity) continue;
         const auto [found, is_new] = known.try_emplace(*identity, each);
         if (!is_new)
             throw Error(ErrorCode::usage,
@@ -42,20 +43,28 @@ void make_parts(const RunFolder& folder, const Scene& scene, bool frames, bool p
     }
 }
 
-HeldFolders::HeldFolders(const std::filesystem::path& own) {
-    if (const std::optional<FileIdentity> identity = identity_behind(own)) known_.insert(*identity);
+HeldFolders::HeldFolders(const std::filesystem::path& own, const FolderLock& lock) {
+    if (const std::optional<FileIdentity> identity = identity_behind(own))
+        known_.emplace(*identity, lock.held());
 }
 
-void HeldFolders::hold(const std::filesystem::path& folder) {
+bool HeldFolders::hold(const std::filesystem::path& folder) {
     const std::optional<FileIdentity> identity = identity_behind(folder);
-    if (!identity || type_behind(folder) != std::filesystem::file_type::directory) return;
-    if (!known_.contains(*identity)) locks_.emplace_back(folder, "run");
-    known_.insert(*identity);
+    if (!identity || known_.contains(*identity)) return false;
+    if (type_behind(folder) != std::filesystem::file_type::directory) return false;
+    known_.emplace(*identity, locks_.emplace_back(folder, "run").held());
+    return true;
 }
 
-bool HeldFolders::holds(const std::filesystem::path& folder) const {
+bool HeldFolders::can_hold(const std::filesystem::path& folder) {
+    try {
+        hold(folder);
+    } catch (const Error&) {
+        return false;
+    }
     const std::optional<FileIdentity> identity = identity_behind(folder);
-    return identity && known_.contains(*identity);
+    const auto found = identity ? known_.find(*identity) : known_.end();
+    return found != known_.end() && found->second;
 }
 
 }  // namespace nephos

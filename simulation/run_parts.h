@@ -4,7 +4,7 @@
 // The folders within that of a run: by links they may lie elsewhere, be one, or be those of other runs, too.
 
 #include <filesystem>
-#include <set>
+#include <map>
 #include <vector>
 
 #include "core/paths.h"
@@ -14,27 +14,28 @@
 
 namespace nephos {
 
-// Returns the folders in that of a run that it writes to, each once, also those that are not there yet; `frames`, `pictures`:
-// whether it has any.
-std::vector<std::filesystem::path> parts_of_run(const RunFolder& folder, const Scene& scene, bool frames,
-                                                bool pictures);
+// Returns the folders in that of a run that it writes to, each once, also those that are not there yet; `pictures`: of its frames.
+std::vector<std::filesystem::path> parts_of_run(const RunFolder& folder, const Scene& scene,
+                                                const SimulationRange& range, bool pictures);
 
-// Makes the parts. Throws Error(io), and Error(usage) where the density folders of layers are one, by links or on a disk for which
-// upper and lower case are the same: the frames of one layer would replace those of another.
-void make_parts(const RunFolder& folder, const Scene& scene, bool frames, bool pictures);
+// Throws Error(usage) where the density folders of two layers are one, by links or on a disk for which upper and lower case are the
+// same: the frames of one layer would replace those of the other.
+void refuse_shared_density_folders(const RunFolder& folder, const Scene& scene);
 
 // Locks on folders, each of which is locked once by whatever path it is reached. They last as long as this lives.
 class HeldFolders {
   public:
-    // `own`: a folder whose lock somebody else holds for the same run.
-    explicit HeldFolders(const std::filesystem::path& own);
+    // `own`: the folder of the run, which `lock` is of.
+    HeldFolders(const std::filesystem::path& own, const FolderLock& lock);
 
-    // Does nothing where there is no folder. Throws Error(io) when another run or export writes into it.
-    void hold(const std::filesystem::path& folder);
-    bool holds(const std::filesystem::path& folder) const;
+    // Locks a folder, and returns whether it was not known before; does nothing where there is none. Throws Error(io) when another run
+    // or export writes into it.
+    bool hold(const std::filesystem::path& folder);
+    // Returns whether a folder is locked, and tries to lock it. False, too, on file systems without locks.
+    bool can_hold(const std::filesystem::path& folder);
 
   private:
-    std::set<FileIdentity> known_;
+    std::map<FileIdentity, bool> known_;  // whether they are locked
     std::vector<FolderLock> locks_;
 };
 

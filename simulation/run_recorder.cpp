@@ -17,6 +17,7 @@
 #include "density/voxel_digest.h"
 #include "simulation/branch.h"
 #include "simulation/earlier_run.h"
+#include "simulation/own_files.h"
 
 namespace nephos {
 
@@ -56,9 +57,10 @@ void RunRecorder::begin() {
     }
 }
 
-void RunRecorder::begin_branch(const Simulation& simulation) {
+void RunRecorder::begin_branch(const Simulation& simulation,
+                               const std::vector<std::filesystem::path>& replaced) {
     require_tables_of_other_run(settings_, simulation.next_step());
-    remove_earlier_run(folder_);
+    remove_files(replaced);
     write_manifest(false, 0);
     const PublishCheck check(guard_);
     copy_tables_of_other_run(settings_, folder_, simulation.next_step());
@@ -102,7 +104,16 @@ void RunRecorder::take_over(const Simulation& simulation) {
     for (FrameRecord& frame : state_.frames) {
         frame.files = std::move(files[frame.number]);
         if (frame.files.empty()) frame.files = digests_of_frame(frame.number);
-        for (const FileRecord& file : frame.files) require_size(file);
+        for (const FileRecord& file : frame.files) {
+            require_size(file);
+            const bool names_state =
+                file.path.ends_with(".vdb") && settings_.scene.layers.empty() && !earlier.frames_hash.empty();
+            if (names_state && !names_hash(folder_.folder / file.path, frame.state_hash.hex()))
+                throw Error(ErrorCode::io,
+                            fmt::format("{}: is of another state than the frame that was written: start anew "
+                                        "with --overwrite",
+                                        (folder_.folder / file.path).string()));
+        }
     }
 }
 

@@ -47,9 +47,9 @@ class RunRecorder : public SimulationSink {
     // The files of a run that begins. A folder that cannot be written to is found now.
     void begin();
 
-    // Goes on from the statistics of the run that this one branches off, with frames of its own. The manifest is there before
+    // Goes on from the statistics of the run that this one branches off, with frames of its own, in the place of the files `replaced`. The manifest is there before
     // the first of them: without it they would be nobody's, should this fail.
-    void begin_branch(const Simulation& simulation);
+    void begin_branch(const Simulation& simulation, const std::vector<std::filesystem::path>& replaced);
 
     // Takes over what an earlier run reported up to where `simulation` goes on, and checks that it is all
     // there.

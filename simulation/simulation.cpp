@@ -119,10 +119,9 @@ Simulation::Simulation(const Scene& scene, const SimulationRange& range, std::st
       layers_(make_layers(scene_, std::move(initial), parts_for(results))),
       ground_(dry_or_covered(scene)),
       next_frame_(range.first_frame) {
-    if (results_ == SimulationResults::statistics && range_.last_frame >= range_.first_frame)
+    if (results_ == SimulationResults::statistics && range_.has_frames())
         throw Error(ErrorCode::usage, "statistics alone have no frames");
-    if (range_.last_frame >= range_.first_frame &&
-        steps_up_to(moment_of_number(range_.last_frame)) > range_.last_step) {
+    if (range_.has_frames() && steps_up_to(moment_of_number(range_.last_frame)) > range_.last_step) {
         throw Error(ErrorCode::usage,
                     fmt::format("frame {} shows {:g} s, but the simulation ends at {:g} s", range_.last_frame,
                                 frame_time_s(scene_.frames, range_.last_frame - 1),
@@ -178,8 +177,10 @@ bool Simulation::density_is_due(std::uint64_t step) const { return steps_taken()
 // The lowest step whose density a result still needs, also one of a longer range: all frames that the scene's
 // steps hold are then followed by more.
 std::uint64_t Simulation::lowest_needed() const {
-    const bool frames_follow =
-        scene_.frames.enabled && scene_.frames.count == 0 && range_ == full_range(scene_);
+    // A branch has the last frames alone.
+    const SimulationRange full = full_range(scene_);
+    const bool frames_follow = scene_.frames.enabled && scene_.frames.count == 0 &&
+                               range_.last_step == full.last_step && range_.last_frame == full.last_frame;
     std::uint64_t lowest = next_step_;
     if (next_frame_ <= range_.last_frame || (frames_follow && next_frame_ <= kMaxFrames))
         lowest = std::min(lowest, moment_of_number(next_frame_).step);
@@ -206,7 +207,7 @@ void Simulation::step() {
 }
 
 void Simulation::go_to(std::uint64_t step) {
-    assert(step >= next_step_ && step <= range_.last_step && range_.last_frame < range_.first_frame);
+    assert(step >= next_step_ && step <= range_.last_step && !range_.has_frames());
     next_step_ = step;
     forget();
     while (!density_is_due(next_step_)) this->step();

@@ -132,6 +132,7 @@ class SimulationSink {
 struct SimulationRange {
     std::uint64_t last_step = 0;  // steps 0..last_step are reported
     int first_frame = 1, last_frame = 0;
+    bool has_frames() const { return last_frame >= first_frame; }
     bool operator==(const SimulationRange&) const = default;
 };
 

@@ -48,7 +48,7 @@ void remove_listed(const RunListing& run, const std::set<std::string>& listed,
     for (const std::string& name : listed)
         by_name.emplace(std::filesystem::path(name).filename().string(), run.folder / name);
     const RunFolder own{run.folder, run.scene.name};
-    for (const std::filesystem::path& path : {own.manifest(), own.checkpoint()})
+    for (const std::filesystem::path& path : {own.manifest(), own.checkpoint(), own.statistics()})
         by_name.emplace(path.filename().string(), path);
     std::erase_if(extra, [&](const std::filesystem::path& path) {
         const auto [begin, end] = by_name.equal_range(path.filename().string());

@@ -369,6 +369,7 @@ NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string&
 void NetcdfSource::read(std::uint64_t first, std::span<double> values) const {
     const Variable& v = *variable_;
     const std::uint64_t bytes = size_of(v.found.type);
+    if (v.found.begin > v.reader.size()) throw Error(ErrorCode::io, v.path.string() + ": ends early");
     for (std::size_t n = 0; n < values.size(); ++n) {
         const std::uint64_t place = first + n;
         const std::uint64_t at =

@@ -24,7 +24,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kSeedDigits = 19;  // of 63 bits
 
-// The runs that are done, in the order of the plan.
+// A run that is done.
 struct DoneRun {
     PlannedRun run;
     const RunRecord* record;
@@ -97,7 +97,7 @@ class SeriesTable {
     void write(const std::filesystem::path& path);
 
   private:
-    // Of its dimensions.
+    // Indices of its dimensions.
     static constexpr std::size_t kRun = 0, kStep = 1, kLevel = 2, kSizeBin = 3, kIdLength = 4,
                                  kSeedLength = 5;
 
@@ -125,7 +125,7 @@ class SeriesTable {
 
     const SweepPlan& plan_;
     std::vector<DoneRun> done_;
-    std::uint64_t steps_ = 0;
+    std::uint64_t longest_steps_ = 0;
     std::size_t levels_ = 1, bins_ = 1;
     std::vector<RunCoordinates> coordinates_;
     std::vector<NetcdfVariable> variables_;
@@ -133,6 +133,7 @@ class SeriesTable {
     UnpackedSeries unpacked_;
 };
 
+// Returns those of the plan, in its order.
 std::vector<DoneRun> done_runs(const SweepPlan& plan, const Records& records) {
     std::vector<DoneRun> done;
     for (std::uint64_t n = 0; n < plan.runs(); ++n) {
@@ -148,7 +149,7 @@ SeriesTable::SeriesTable(const SweepPlan& plan, const Records& records)
     if (done_.empty()) return;
     for (const DoneRun& one : done_) {
         const RunResult& result = one.record->result;
-        steps_ = std::max(steps_, result.steps);
+        longest_steps_ = std::max(longest_steps_, result.steps);
         levels_ = std::max(levels_, result.profile.size());
         bins_ = std::max(bins_, result.sizes.size());
     }
@@ -202,7 +203,7 @@ void SeriesTable::add_places() {
     variables_.push_back(variable("time", NetcdfType::float64, in_runs(kStep),
                                   described("s", "simulated time since the start"), [this](const Put& put) {
                                       for (const RunCoordinates& run : coordinates_)
-                                          for (std::uint64_t n = 0; n <= steps_; ++n)
+                                          for (std::uint64_t n = 0; n <= longest_steps_; ++n)
                                               put(double(n) * run.step_s);
                                   }));
     variables_.push_back(variable("height", NetcdfType::float64, in_runs(kLevel),
@@ -254,7 +255,7 @@ void SeriesTable::add_series() {
                              const RunRecord& record = *done_[run].record;
                              const std::vector<float>& values = unpacked_.of(run, record);
                              const std::uint64_t count = record.result.steps + 1;
-                             for (std::uint64_t n = 0; n <= steps_; ++n)
+                             for (std::uint64_t n = 0; n <= longest_steps_; ++n)
                                  put(n < count ? double(values[s * count + n]) : kNaN);
                          }
                      }));
@@ -278,7 +279,7 @@ void SeriesTable::write(const std::filesystem::path& path) {
     write_netcdf(
         path,
         {{"run", done_.size()},
-         {"step", steps_ + 1},
+         {"step", longest_steps_ + 1},
          {"level", levels_},
          {"size_bin", bins_},
          {"run_id_length", kIdCharacters},

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
@@ -15,14 +14,6 @@
 
 namespace nephos {
 namespace {
-
-constexpr double kRadians = std::numbers::pi / 180;
-
-double number_in(const Node& table, std::string_view key) {
-    const Entry* entry = table.find(key);
-    if (entry == nullptr) return 0;
-    return entry->value.kind == Node::Kind::integer ? double(entry->value.integer) : entry->value.number;
-}
 
 std::vector<TextEntry> entries_of(const Velocity& v, bool polar) {
     const auto tenth = [](double value) { return number_text(std::round(10 * value) / 10); };

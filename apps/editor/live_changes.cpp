@@ -259,7 +259,12 @@ bool record_wind(Editor& editor, const TextPath& path, const std::string& edited
     // What is shown of the list is now its newest key frame.
     if (editor.selected.size() > array.size() &&
         std::equal(array.begin(), array.end(), editor.selected.begin())) {
+        const auto end = std::ptrdiff_t(array.size() + 1);
+        const TextPath before(editor.selected.begin(), editor.selected.begin() + end);
         editor.selected[array.size()].index = recorded->keys - 1;
+        const TextPath now(editor.selected.begin(), editor.selected.begin() + end);
+        const bool goes_on = editor.followed_rows && editor.followed_rows->now == before;
+        editor.followed_rows = {now, goes_on ? editor.followed_rows->before : before};
     }
     return true;
 }

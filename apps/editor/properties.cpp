@@ -107,11 +107,23 @@ std::string renamed(const Editor& editor, const std::string& text, const TextPat
     return with_new_name(text, editor.document->values(), path, name, names_from_files(editor));
 }
 
+bool starts_with(const TextPath& path, const TextPath& beginning) {
+    return path.size() >= beginning.size() && std::equal(beginning.begin(), beginning.end(), path.begin());
+}
+
+// Returns by what ImGui knows the field of a key.
+std::string row_id(const Editor& editor, const TextPath& path) {
+    if (!editor.followed_rows || !starts_with(path, editor.followed_rows->now)) return path_text(path);
+    TextPath id = editor.followed_rows->before;
+    id.insert(id.end(), path.begin() + std::ptrdiff_t(editor.followed_rows->now.size()), path.end());
+    return path_text(id);
+}
+
 void value_row(Editor& editor, const ValueRow& row) {
     const std::string name = path_text(row.path);
     ImGui::TableNextRow();
     ImGui::TableNextColumn();
-    ImGui::PushID(name.c_str());
+    ImGui::PushID(row_id(editor, row.path).c_str());
     ImGui::AlignTextToFramePadding();
     const std::string label = readable_name(row.key);
     if (row.present) {
@@ -208,7 +220,7 @@ void nested_tables(Editor& editor, const Section& section, const TextPath& path)
         const TextPath at = joined_path(path, key.name);
         const bool present = value_node(editor.document->values(), at) != nullptr;
         const std::string name = path_text(at);
-        ImGui::PushID(name.c_str());
+        ImGui::PushID(row_id(editor, at).c_str());
         const bool open = ImGui::CollapsingHeader(
             readable_name(key).c_str(), present ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None);
         editor.controls.note("section " + name);
@@ -331,6 +343,9 @@ std::size_t models_from_files(const Editor& editor) {
 
 void properties_panel(Editor& editor) {
     leave_missing_element(editor);
+    const bool is_followed = editor.followed_rows && editor.filter.empty() &&
+                             starts_with(editor.selected, editor.followed_rows->now);
+    if (!is_followed) editor.followed_rows.reset();
     ImGui::SetNextItemWidth(-1);
     input_text("##filter", editor.filter, "Find a key of the scene");
     editor.controls.note("find");

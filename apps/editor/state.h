@@ -219,6 +219,11 @@ struct Editor : OpenScene {
         std::optional<std::string> before;  // of one that key frames stand for
     };
     std::optional<RecordedValue> recorded_value;
+    // The key frame that recording has chosen in the place of another one, whose fields it goes on with: the caret stays.
+    struct FollowedRows {
+        TextPath now, before;
+    };
+    std::optional<FollowedRows> followed_rows;
     // Keeps what fields show of keys that key frames stand for, by their paths. It stands still while a number has the caret,
     // whose field would give what it began with back as a change.
     std::map<std::string, std::string> values_now;

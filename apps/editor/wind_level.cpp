@@ -12,15 +12,8 @@
 namespace nephos {
 namespace {
 
-constexpr double kRadians = std::numbers::pi / 180;  // per degree
 constexpr std::array<std::string_view, 2> kPolar{"from_deg", "speed_m_per_s"},
     kComponents{"east_m_per_s", "north_m_per_s"};
-
-double number_in(const Node& table, std::string_view key) {
-    const Entry* entry = table.find(key);
-    if (entry == nullptr) return 0;
-    return entry->value.kind == Node::Kind::integer ? double(entry->value.integer) : entry->value.number;
-}
 
 bool has_any(const Node& level, const std::array<std::string_view, 2>& keys) {
     return std::ranges::any_of(keys, [&](std::string_view key) { return level.find(key) != nullptr; });
@@ -28,12 +21,17 @@ bool has_any(const Node& level, const std::array<std::string_view, 2>& keys) {
 
 }  // namespace
 
+double number_in(const Node& table, std::string_view key) {
+    const Entry* entry = table.find(key);
+    if (entry == nullptr) return 0;
+    return entry->value.kind == Node::Kind::integer ? double(entry->value.integer) : entry->value.number;
+}
+
 bool is_polar(const Node& level) { return has_any(level, kPolar); }
 
 Velocity velocity_of(const Node& level) {
     if (!is_polar(level)) return {number_in(level, "east_m_per_s"), number_in(level, "north_m_per_s")};
-    const double speed = number_in(level, "speed_m_per_s"), from = number_in(level, "from_deg") * kRadians;
-    return {-speed * std::sin(from), -speed * std::cos(from)};
+    return velocity_from(number_in(level, "from_deg"), number_in(level, "speed_m_per_s"));
 }
 
 std::optional<double> value_of_wind(const Velocity& wind, std::string_view key) {
@@ -43,8 +41,10 @@ std::optional<double> value_of_wind(const Velocity& wind, std::string_view key) 
     if (key == "speed_m_per_s") return speed;
     if (key != "from_deg") return std::nullopt;
     if (speed == 0) return 0;
-    const double from = std::atan2(-wind.east_m_per_s, -wind.north_m_per_s) / kRadians;
-    return from < 0 ? from + 360 : from;
+    constexpr double kRadians = std::numbers::pi / 180;  // per degree
+    const double from = std::atan2(-wind.east_m_per_s, -wind.north_m_per_s) / kRadians,
+                 turned = from < 0 ? from + 360 : from;
+    return turned < 360 ? turned : 0;  // of one that is a little below 0
 }
 
 const Node* level_of_wind(const Node& values, const TextPath& path) {
@@ -59,16 +59,17 @@ std::string with_value_of_wind(const std::string& text, const Node& values, cons
     const Node* const level = level_of_wind(values, path);
     if (level == nullptr) return with_value(text, path, value, form);
     const bool becomes_polar = std::ranges::count(kPolar, path.back().name) > 0;
-    const auto &now = becomes_polar ? kPolar : kComponents, &before = becomes_polar ? kComponents : kPolar;
-    if (has_any(*level, now) || !has_any(*level, before)) return with_value(text, path, value, form);
+    const auto &new_keys = becomes_polar ? kPolar : kComponents,
+               &old_keys = becomes_polar ? kComponents : kPolar;
+    if (has_any(*level, new_keys) || !has_any(*level, old_keys)) return with_value(text, path, value, form);
     constexpr int kDigits = 10;
     TextPath at = path;
     std::string out = text;
-    for (const std::string_view key : before) {
+    for (const std::string_view key : old_keys) {
         at.back().name = key;
         out = without(out, at);
     }
-    for (const std::string_view key : now) {
+    for (const std::string_view key : new_keys) {
         at.back().name = key;
         out = with_value(
             out, at,

@@ -254,16 +254,17 @@ void add_export_command(CLI::App& app, Action& action) {
             "--layer", [a](const std::string& text) { a->options.layer = text; },
             "A layer by name, each, or all together (default)")
         ->type_name("NAME");
-    add_value(*command, "--frames", "A..B[/STEP]",
-              "Only these frames, by their numbers (of a run from 1, of files from 0)",
-              [a](const std::string& text) {
-                  const std::size_t slash = text.find('/');
-                  const FrameRange range = parse_frames_from_0(text.substr(0, slash));
-                  a->options.first_frame = range.first;
-                  a->options.last_frame = range.last;
-                  if (slash != text.npos)
-                      a->options.frame_step = int(parse_integer(text.substr(slash + 1), 1, 1'000'000));
-              });
+    add_value(
+        *command, "--frames", "A..B[/STEP]",
+        "Only these frames, by their numbers (of a run from 1, of files as they are named, else from 1)",
+        [a](const std::string& text) {
+            const std::size_t slash = text.find('/');
+            const FrameRange range = parse_frames_from_0(text.substr(0, slash));
+            a->options.first_frame = range.first;
+            a->options.last_frame = range.last;
+            if (slash != text.npos)
+                a->options.frame_step = int(parse_integer(text.substr(slash + 1), 1, 1'000'000));
+        });
     add_shape_options(*command, a);
     command
         ->add_option("--velocity", a->options.velocity_name,

@@ -39,7 +39,7 @@ struct GridGeometry {
     int refine = 1;       // voxels per cell and axis; 1, too, where a voxel is larger than a cell
     Placement placement;  // of the voxels
     double shift_voxels = 0;  // added to the places that are written, along each axis, in voxels of this grid
-    int density_voxels_edge = 1;  // edge of a voxel of this grid, in voxels of density
+    int coarsening = 1;       // edge of a voxel here, in voxels of density
 };
 
 void check_plane(const std::optional<BitPlaneView>& plane, std::optional<Extent>& cells) {
@@ -180,7 +180,7 @@ GridGeometry geometry_of_wind(const GridGeometry& density) {
     const auto fewer = [&](int n) { return (n + edge - 1) / edge; };
     wind.voxels = {fewer(density.voxels.x), fewer(density.voxels.y), fewer(density.voxels.z)};
     wind.placement.cell_size_m *= edge;
-    wind.density_voxels_edge = edge;
+    wind.coarsening = edge;
     // Of coarser voxels there are fewer to a cell, or a cell is less than one of them.
     wind.refine = density.refine % edge == 0 ? density.refine / edge : 1;
     return wind;
@@ -200,13 +200,14 @@ std::vector<openvdb::Vec3s> profile_of(const std::vector<Velocity>& levels, int 
     return profile;
 }
 
-// The wind at each voxel's centre of the whole box: it blows where no cloud is, too. Blocks of one velocity are tiles.
+// The wind at each voxel's centre of the whole box: it blows where no cloud is, too; the profile of voxels that reach beyond the box in
+// the middle of what lies in it. Blocks of one velocity are tiles.
 VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& density,
                               const GridGeometry& geometry) {
     if (content.wind.size() != std::size_t(density.voxels.z))
         throw Error(ErrorCode::usage, "a VDB file needs one velocity of the wind a level of voxels");
     const std::vector<openvdb::Vec3s> profile =
-        profile_of(content.wind, geometry.density_voxels_edge, geometry.voxels.z);
+        profile_of(content.wind, geometry.coarsening, geometry.voxels.z);
     auto grid = VectorGrid::create(openvdb::Vec3s(0.0f));
     grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
     openvdb::tree::ValueAccessor<VectorTree> accessor(grid->tree());

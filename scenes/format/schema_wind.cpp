@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sections of the wind: its profile and its fields.
 
-#include "core/math.h"
+#include "core/wind.h"
 #include "scenes/format/schema_build.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
@@ -29,13 +29,6 @@ constexpr double kFastest_m_per_s = 1000;
 }  // namespace
 
 namespace {
-
-// The wind that comes from a direction, clockwise from north. sin_cos_deg() has the same bits on every
-// machine, which matters because the velocity decides the bits of the simulation.
-Velocity velocity_from(double from_deg, double speed_m_per_s) {
-    const Rotation from = sin_cos_deg(from_deg);
-    return {0.0 - speed_m_per_s * from.sin, 0.0 - speed_m_per_s * from.cos};
-}
 
 void finish_level(const SectionReader& reader, void* owner) {
     auto& level = *static_cast<WindLevel*>(owner);

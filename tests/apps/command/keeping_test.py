@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files that are there already, and that a call must not lose: of somebody, of another run, or what it reads itself."""
 
+import fcntl
 import json
 import os
 import pathlib
@@ -344,8 +345,42 @@ class Keeping(Case):
                 (self.folder / "own" / folder).symlink_to("../../disk")
             hidden = self.folder / "own" / folder / ".tiny_0009.part123-456.vdb"
             hidden.write_text("on the way")
+            other = os.open(self.folder / "disk", os.O_RDONLY)  # where another run is at work
+            fcntl.flock(other, fcntl.LOCK_EX)
             self.call(*self.plain, "--out", "own", "--resume")
+            os.close(other)
             self.assertEqual(hidden.exists(), is_kept, folder)
+
+    def test_frames_of_another_run_at_the_places_of_an_interrupted_one(self):
+        """Behind a link that two runs share, or put there: neither run nor --resume takes them for its own."""
+        (self.folder / "disk").mkdir()
+        for out in ("a", "b"):
+            (self.folder / out).mkdir()
+            (self.folder / out / "density").symlink_to("../disk")
+        environment = {**self.environment, "LD_PRELOAD": os.environ.get("FAILING_CALLS", ""), "FAIL_CALL": "rename KILL 2 1", "FAIL_PATH": "/a/",
+                       "FAIL_PROGRAM": "nephos"}
+        if "FAILING_CALLS" not in os.environ:
+            self.skipTest("no failing calls")
+        out = str(self.folder / "a")
+        self.assertEqual(subprocess.run([NEPHOS, *map(str, self.plain), "--out", out], cwd=self.folder, env=environment).returncode, -signal.SIGKILL)
+        self.call(*self.plain, "--seed", "9", "--out", "b")
+        for more in ([], ["--resume"]):
+            self.kept("b", 2, *self.plain, "--out", "a", *more, says="density/tiny_0001.vdb is not what the run in it has written")
+        # With a checkpoint before its frames are all there.
+        environment["FAIL_CALL"], environment["FAIL_PATH"] = "rename KILL 9 1", "/c/"
+        interrupted = [NEPHOS, *map(str, self.plain), "--checkpoint-every", "0.0001", "--out", str(self.folder / "c")]
+        self.assertEqual(subprocess.run(interrupted, cwd=self.folder, env=environment).returncode, -signal.SIGKILL)
+        frames = sorted(path.name for path in (self.folder / "c/density").glob("*.vdb"))
+        self.assertIn(len(frames), range(1, 5), frames)
+        for name in (frames[0], "tiny_0005.vdb"):
+            shutil.copytree(self.folder / "c", self.folder / f"c-{name}")
+            shutil.copy(self.folder / "b/density" / name, self.folder / f"c-{name}/density")
+            before = self.files(f"c-{name}/density")
+            self.refused(2, *self.plain, "--out", f"c-{name}", "--resume", says=f"density/{name}: is of another run, or of none")
+            self.assertEqual(before, self.files(f"c-{name}/density"))
+        self.call(*self.plain, "--out", "c", "--resume")
+        self.call(*self.plain, "--out", "whole")
+        self.same_runs("c", "whole")
 
     def test_a_file_called_like_the_next_frame(self):
         self.call(*self.plain, "--set", "time.steps=4", "--out", "run")

@@ -394,6 +394,23 @@ class Branch(Case):
                 if not count:
                     self.same_runs(f"{name} long", f"{name} short")
 
+    def test_can_be_lengthened_at_every_step(self):
+        """Whatever its next frame is made of; also a branch off a branch, and one that had no frame yet."""
+        self.call("run", self.scene, "--no-render", "--out", "from", "--set", "time.steps=3")
+        branch = ("--no-render", "--set", "field.background.ext=0.06", "-q")
+        self.call("run", "--from", "from", *branch, "--set", "time.steps=9", "--out", "whole")
+        for steps in range(3, 9):
+            with self.subTest(steps=steps):
+                self.call("run", "--from", "from", *branch, "--set", f"time.steps={steps}", "--out", f"b{steps}")
+                self.call("run", "--from", f"b{steps}", "--no-render", "--set", "time.steps=9", "-q", "--out", f"c{steps}")
+                self.call("run", *branch[:1], "--set", "time.steps=9", "-q", "--out", f"b{steps}", "--resume")
+                self.same_runs("whole", f"b{steps}")
+        self.call("run", "--from", "from", "--splatting", "cpu", "--set", "time.steps=3", "-q", "--out", "d")
+        self.assertFalse((self.folder / "d/frames").exists())
+        self.call("run", "--splatting", "cpu", "--set", "time.steps=9", "-q", "--out", "d", "--resume")
+        self.assertTrue((self.folder / "d/frames").exists())
+        self.call("verify", "d")
+
     def test_files_that_are_links_keep_their_names(self):
         self.call("state", self.scene, "--steps", 4, "--out", "store.vdb")
         (self.folder / "in").mkdir()

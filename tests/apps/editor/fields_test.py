@@ -83,6 +83,17 @@ class Fields(Kept):
             speed = (level["east_m_per_s"] ** 2 + level["north_m_per_s"] ** 2) ** 0.5
             self.assertTrue(least <= speed <= most, f"{act}\n{written}")
 
+    def test_tab_goes_on_from_a_recorded_number(self):
+        """To the next field, of the key frame that has just been made; backwards, too."""
+        scene = self.folder / "w.toml"
+        for first, typed, key, second in (("from_deg", "90", "TAB", "8"), ("speed_m_per_s", "8", "SHIFT+TAB", "90")):
+            scene.write_text(WIND, encoding="utf-8")
+            self.edit(scene, script=f"{RECORD_WIND}double-click-at wind[0].levels[0].{first} 0.5 0.5\nkey CTRL+A\ntype {typed}\nwait 0.3\n"
+                                    f"key {key}\nwait 1\ntype {second}\nwait 0.3\nkey ENTER\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+            level, = tomllib.loads(scene.read_text(encoding="utf-8"))["wind"][-1]["levels"]
+            self.assertAlmostEqual(level["east_m_per_s"], -8, 5, f"{key}\n{scene.read_text(encoding='utf-8')}")
+            self.assertAlmostEqual(level["north_m_per_s"], 0, 5)
+
     def test_a_handle_moves_one_coordinate(self):
         scene = self.folder / "h.toml"
         text = ('seed = 4\n[lattice]\ncells = [32, 32, 24]\ncell_size_m = 100\n[field]\nellipsoids = [{ centre_m = [0.123456, 0.654321, 1200.5], '
@@ -521,8 +532,9 @@ class Problems(Kept):
             saved = self.saved(text, f"{choose}set {level}.{key} {value}\nwait 0.3\n")
             self.assertEqual(saved, text.replace("east_m_per_s = 3, north_m_per_s = 4", wanted))
         polar = text.replace("east_m_per_s = 3, north_m_per_s = 4", "from_deg = 270, speed_m_per_s = 5")
-        saved, = tomllib.loads(self.saved(polar, f"{choose}set {level}.north_m_per_s 2\nwait 0.3\n"))["wind"][0]["levels"]
-        self.assertEqual({key: round(value, 6) for key, value in saved.items()}, {"height_m": 1000, "east_m_per_s": 5, "north_m_per_s": 2})
+        for key, value, wanted in (("north_m_per_s", "2", "east_m_per_s = 5, north_m_per_s = 2"), ("east_m_per_s", "3", "east_m_per_s = 3, north_m_per_s = 0")):
+            self.assertEqual(self.saved(polar, f"{choose}set {level}.{key} {value}\nwait 0.3\n"),
+                             text.replace("east_m_per_s = 3, north_m_per_s = 4", wanted))
 
     def test_a_change_of_the_climate_leaves_what_was_before(self):
         scene = self.folder / "c.toml"
