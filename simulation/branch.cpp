@@ -184,6 +184,7 @@ Simulation branched_simulation(const RunSettings& settings, const RunFolder& fol
 void refuse_to_remove_other_run(const RunSettings& settings,
                                 const std::vector<std::filesystem::path>& files) {
     const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
+    if (is_same_place(settings.folder, parent.folder)) return;  // which branched_simulation() refuses
     std::vector<std::filesystem::path> needed{settings.branch->checkpoint, parent.statistics()};
     for (const LayerOptions& layer : settings.scene.layers) needed.push_back(parent.statistics(layer.name));
     for (const std::filesystem::path& each : needed) {
