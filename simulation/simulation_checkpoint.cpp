@@ -245,8 +245,17 @@ void Simulation::restore_history(const Checkpoint& checkpoint, Restart restart) 
                         : "the checkpoint belongs to a run without detail and without the state: expected "
                           "`detail.enabled = false` and no `density.write_state`, as then");
     }
+    if ((content >> 1) != (expected >> 1)) {
+        const bool was_of_frames = content >> 1 == unsigned(SimulationResults::everything);
+        throw Error(ErrorCode::usage,
+                    was_of_frames
+                        ? "the checkpoint belongs to a run with density: leave out --statistics-only "
+                          "(--no-render writes no pictures)"
+                        : "the checkpoint belongs to a run of statistics alone, or without density: expected "
+                          "--statistics-only, or as then");
+    }
     const bool may_continue = restart == Restart::branch || continues(before, range_);
-    if (!may_continue || !same_window || content != expected) {
+    if (!may_continue || !same_window) {
         throw Error(ErrorCode::usage,
                     "the checkpoint belongs to a run with other frames or another smoothing window");
     }

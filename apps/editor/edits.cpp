@@ -55,8 +55,9 @@ void finish_recorded_value(Editor& editor) {
     bool is_other = false;  // not where it was changed back
     attempt(editor, [&] {
         const std::string& text = editor.document->text();
-        is_other = done.before ? *done.before != done.value
-                               : with_value(text, done.path, done.value, done.form) != text;
+        is_other = done.before
+                       ? *done.before != done.value
+                       : with_value(text, recorded_place(editor, done.path), done.value, done.form) != text;
     });
     if (is_other)
         set_values(editor, TextPath(done.path.begin(), done.path.end() - 1),
@@ -65,7 +66,7 @@ void finish_recorded_value(Editor& editor) {
 
 void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging,
                 NumberForm form) {
-    TextPath path = table;
+    TextPath path = recorded_place(editor, table);
     path.push_back({entries.front().first, 0});
     const std::string name = path_text(path);
     const auto changed = [&](std::string text) {

@@ -180,13 +180,23 @@ void apply(Editor& editor, const std::string& text, const std::string& what, con
     editor.live->change(*editor.shown_scene);
 }
 
+// Returns how many steps the automata have taken where the simulation is that the user sees: it may still be on the way there.
+std::uint64_t steps_at_goal(const LiveStatus& status, const Scene& scene) {
+    const bool is_there = status.goal <= status.step + (status.running ? 1 : 0);
+    if (is_there) return status.steps_taken;
+    return std::max(status.steps_taken, status.goal + std::uint64_t(scene.density.smoothing.t0));
+}
+
 struct Held {
-    explicit Held(LiveScene& live) : scene(live), step(live.hold()) {}
+    explicit Held(Editor& editor) : scene(*editor.live) {
+        scene.hold();
+        step = steps_at_goal(scene.status(), *editor.document->current_scene());
+    }
     ~Held() { scene.release(); }
     Held(const Held&) = delete;
     Held& operator=(const Held&) = delete;
     LiveScene& scene;
-    std::uint64_t step;
+    std::uint64_t step = 0;  // taken, where a change acts from
 };
 
 // Length of the path of a wind's array at the start of a path; 0 when it is none.
@@ -247,8 +257,12 @@ std::optional<RecordedWind> with_recorded_wind(const Editor& editor, const TextP
 // Clouds that enter at the end of the present step were placed with the wind that it has there: a change follows it.
 std::uint64_t step_of_change(std::uint64_t steps_taken) { return steps_taken + 1; }
 
+std::uint64_t step_of_next_change(const Editor& editor) {
+    return step_of_change(steps_at_goal(editor.live->status(), *editor.document->current_scene()));
+}
+
 bool record_wind(Editor& editor, const TextPath& path, const std::string& edited) {
-    const Held held(*editor.live);
+    const Held held(editor);
     const std::uint64_t from = step_of_change(held.step);
     const auto recorded = with_recorded_wind(editor, path, edited, from);
     if (!recorded) return false;
@@ -259,13 +273,13 @@ bool record_wind(Editor& editor, const TextPath& path, const std::string& edited
     // What is shown of the list is now its newest key frame.
     if (editor.selected.size() > array.size() &&
         std::equal(array.begin(), array.end(), editor.selected.begin())) {
-        const auto end = std::ptrdiff_t(array.size() + 1);
-        const TextPath before(editor.selected.begin(), editor.selected.begin() + end);
         editor.selected[array.size()].index = recorded->keys - 1;
-        const TextPath now(editor.selected.begin(), editor.selected.begin() + end);
-        const bool goes_on = editor.followed_rows && editor.followed_rows->now == before;
-        editor.followed_rows = {now, goes_on ? editor.followed_rows->before : before};
     }
+    const TextPath frame(path.begin(), path.begin() + std::ptrdiff_t(array.size() + 1));
+    TextPath now = frame;
+    now.back().index = recorded->keys - 1;
+    const bool goes_on = editor.followed_rows && editor.followed_rows->now == frame;
+    editor.followed_rows = {now, goes_on ? editor.followed_rows->before : frame, from};
     return true;
 }
 
@@ -288,6 +302,17 @@ bool is_recorded(const Editor& editor, const TextPath& path) {
     // While the text has problems the sun is that of an earlier one: its keys are shown and set as they are.
     return is_sun(path) && editor.document->current_scene() != nullptr && editor.shown_scene &&
            !editor.shown_scene->sun_path.empty();
+}
+
+TextPath recorded_place(const Editor& editor, const TextPath& path) {
+    const auto& followed = editor.followed_rows;
+    if (!followed || !editor.record || editor.filter.empty() || path.size() < followed->before.size() ||
+        !std::equal(followed->before.begin(), followed->before.end(), path.begin()) ||
+        editor.document->current_scene() == nullptr || followed->step != step_of_next_change(editor))
+        return path;
+    TextPath out = followed->now;
+    out.insert(out.end(), path.begin() + std::ptrdiff_t(followed->before.size()), path.end());
+    return out;
 }
 
 bool is_kept_from_recording(const Editor& editor, const TextPath& path) {
@@ -353,8 +378,7 @@ std::string with_recorded(const Editor& editor, const TextPath& path, const std:
         return key ? with_recorded_sun(editor, text, *key, shown_step(editor)) : edited;
     }
     if (!is_of_wind(path)) return edited;
-    const auto recorded =
-        with_recorded_wind(editor, path, edited, step_of_change(editor.live->status().steps_taken));
+    const auto recorded = with_recorded_wind(editor, path, edited, step_of_next_change(editor));
     return recorded ? recorded->text : edited;
 }
 
@@ -362,7 +386,7 @@ void record_climate(Editor& editor, double final_state, double duration_s) {
     if (!editor.shown_scene) return;
     if (editor.document->current_scene() == nullptr)
         return say(editor, "The climate stays while the text has problems: mend them, or undo", true);
-    const Held held(*editor.live);
+    const Held held(editor);
     const Scene& scene = *editor.document->current_scene();
     const double step_s = scene.automaton.time_step_s, now = double(held.step) * step_s;
     const auto state_at = [&](double time_s) {

@@ -113,7 +113,9 @@ bool starts_with(const TextPath& path, const TextPath& beginning) {
 
 // Returns by what ImGui knows the field of a key.
 std::string row_id(const Editor& editor, const TextPath& path) {
-    if (!editor.followed_rows || !starts_with(path, editor.followed_rows->now)) return path_text(path);
+    const bool is_followed =
+        editor.followed_rows && editor.filter.empty() && starts_with(path, editor.followed_rows->now);
+    if (!is_followed) return path_text(path);
     TextPath id = editor.followed_rows->before;
     id.insert(id.end(), path.begin() + std::ptrdiff_t(editor.followed_rows->now.size()), path.end());
     return path_text(id);
@@ -305,10 +307,11 @@ std::string text_with_typed(const Editor& editor) {
     try {
         const Node& values = editor.document->values();
         if (const auto& recorded = editor.recorded_value) {
+            const TextPath path = recorded_place(editor, recorded->path);
             const std::string edited =
-                with_value_of_wind(text, values, recorded->path, recorded->value, recorded->form);
+                with_value_of_wind(text, values, path, recorded->value, recorded->form);
             try {
-                return with_recorded(editor, recorded->path, edited);
+                return with_recorded(editor, path, edited);
             } catch (const Error&) {  // it is kept as it would be without recording
                 return edited;
             }
@@ -343,8 +346,9 @@ std::size_t models_from_files(const Editor& editor) {
 
 void properties_panel(Editor& editor) {
     leave_missing_element(editor);
-    const bool is_followed = editor.followed_rows && editor.filter.empty() &&
-                             starts_with(editor.selected, editor.followed_rows->now);
+    const bool is_followed =
+        editor.followed_rows &&
+        (!editor.filter.empty() || starts_with(editor.selected, editor.followed_rows->now));
     if (!is_followed) editor.followed_rows.reset();
     ImGui::SetNextItemWidth(-1);
     input_text("##filter", editor.filter, "Find a key of the scene");

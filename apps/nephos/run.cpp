@@ -244,6 +244,9 @@ int run(const RunArguments& a) {
     RunSettings settings = settings_of(a);
     const bool wants_frames = settings.scene.frames.enabled && !a.statistics_only;
     const int frames_of_scene = settings.scene.frames.count;
+    const bool is_counted = wants_frames && a.resume && !a.frames && frames_of_scene > 0;
+    const std::uint64_t frames_end_before =
+        is_counted ? steps_up_to(moment_of_frame(settings.scene, frames_of_scene - 1)) : 0;
     std::unique_ptr<ProgressBar> bar;
     RunObserver observer;
     observer.progress = [&](const RunProgress& progress) {
@@ -280,6 +283,12 @@ int run(const RunArguments& a) {
         print_note(
             fmt::format("these steps have no frame: frames.start_s and frames.count = {} lie elsewhere "
                         "(--statistics-only where none is wanted)",
+                        frames_of_scene));
+    if (frames_end_before > 0 && report.complete && report.first_step > frames_end_before && !a.work.quiet)
+        print_note(
+            fmt::format("no frame follows: all of `frames.count` = {} were written before; with 0 there are "
+                        "as many as fit, "
+                        "and a longer run goes on with them",
                         frames_of_scene));
     if (report.skipped && !a.work.quiet) print_note(report.folder.string() + ": is complete already");
     if (a.work.json) {
@@ -358,8 +367,8 @@ void add_run_command(CLI::App& app, Action& action) {
         "  nephos run scenes/cumulus.toml\n"
         "  nephos run scenes/stratus.toml --out /tmp/st --no-render --set time.steps=500\n"
         "  nephos run scenes/cumulus.toml --resume\n"
-        "  nephos run --from out/cumulus --set field.background.ext=0.4 --set time.steps=600 "
-        "--statistics-only \\\n"
+        "  nephos run --from out/cumulus --no-render --set field.background.ext=0.4 --set time.steps=600 "
+        "\\\n"
         "             --out out/drier");
     command->callback([a, &action] { action = [a] { return run(*a); }; });
 }

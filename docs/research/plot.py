@@ -5,12 +5,13 @@
     plot.py points SWEEP/points.csv field.background.ext cover 0.3 0.03 > picture.svg    a statistic along an axis
     plot.py posterior FIT/posterior.csv > picture.svg                                    two parameters of a fit
 
-The first draws means with their 95 % intervals and the band of a target; the second the 1,000 points of the posterior on
+The first draws means with their 95 % intervals, a line for each value of the other axes, and the band of a target; the second the 1,000 points of the posterior on
 logarithmic axes."""
 
 import csv
 import math
 import sys
+from xml.sax.saxutils import escape
 
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 640, 400, 95, 20, 20, 55
 
@@ -71,8 +72,18 @@ def points(path, key, statistic, target, band):
     high, low = plot.at_y(target + band), plot.at_y(target - band)
     plot.out.append(f'<rect x="{LEFT}" y="{high:.1f}" width="{WIDTH - LEFT - RIGHT}" height="{low - high:.1f}" '
                     'fill="#2a7" fill-opacity="0.25"/>')
-    line = " ".join(f"{plot.at_x(x):.1f},{plot.at_y(y):.1f}" for x, y in sorted(zip(xs, ys)))
-    plot.out.append(f'<polyline points="{line}" fill="none" stroke="#25c"/>')
+    columns = list(rows[0])
+    others = [column for column in columns[1:columns.index("runs")] if column != key]  # a line for each of their values
+    lines = {}
+    for row, x, y in zip(rows, xs, ys):
+        lines.setdefault(tuple(row[column] for column in others), []).append((x, y))
+    for values, line in lines.items():
+        along = " ".join(f"{plot.at_x(x):.1f},{plot.at_y(y):.1f}" for x, y in sorted(line))
+        plot.out.append(f'<polyline points="{along}" fill="none" stroke="#25c"/>')
+        if others:
+            name = escape(", ".join(f"{column} = {value}" for column, value in zip(others, values)))
+            x, y = max(line)
+            plot.out.append(f'<text x="{plot.at_x(x) - 6:.1f}" y="{plot.at_y(y) - 6:.1f}" text-anchor="end">{name}</text>')
     for row, x, y in zip(rows, xs, ys):
         a, b = (plot.at_y(float(row[f"{statistic}_{end}"] or y)) for end in ("low", "high"))
         at = plot.at_x(x)

@@ -28,8 +28,8 @@ std::string link_to(const ReportData& data, const ReportPoint& point) {
 
 // What the reader must know before any mean: failed and missing runs, points without means, errors that disagree.
 std::string problems(const ReportData& data) {
-    std::string text, failed, unsteady, differ;
-    std::size_t failed_runs = 0, missing_runs = 0, unsteady_points = 0, differing_points = 0;
+    std::string text, failed, unsteady, differ, wide;
+    std::size_t failed_runs = 0, missing_runs = 0, unsteady_points = 0, differing_points = 0, wide_points = 0;
     for (const ReportPoint& point : data.points) {
         missing_runs += point.summary.missing;
         for (std::size_t n = 0; n < point.runs.size(); ++n) {
@@ -47,6 +47,12 @@ std::string problems(const ReportData& data) {
             differ += fmt::format("<li>{}: cover {}, between seeds {}, within runs {}</li>\n",
                                   link_to(data, point), number_text(cover.mean, 4),
                                   number_text(cover.error, 2), number_text(cover.error_within, 2));
+        }
+        if (has_wide_interval(point.summary) && wide_points++ < kMaxProblems) {
+            const PointMean& cover = point.mean("cover");
+            wide += fmt::format("<li>{}: cover {}, 95 % interval {} to {}</li>\n", link_to(data, point),
+                                number_text(cover.mean, 3), number_text(cover.low, 3),
+                                number_text(cover.high, 3));
         }
     }
     const auto list = [](const std::string& items, std::size_t all) {
@@ -81,9 +87,17 @@ std::string problems(const ReportData& data) {
                     "runs differ 3-fold: the replicates are in phase, or there are too few of them.</p>",
                     differing_points) +
                 list(differ, differing_points);
+    if (wide_points > 0)
+        text += fmt::format(
+                    "<div class=\"problem\"><p>At {} points cover is uncertain by more than a tenth of its "
+                    "mean (hatched in "
+                    "the maps): more replicates or steps make the interval narrower.</p>",
+                    wide_points) +
+                list(wide, wide_points);
     if (text.empty())
         text =
-            "<p class=\"good\">Every run was done, every point has a mean, and its two errors agree.</p>\n";
+            "<p class=\"good\">Every run was done, every point has a mean that is certain to a tenth of it, "
+            "and its two errors agree.</p>\n";
     return text;
 }
 

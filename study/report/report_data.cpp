@@ -186,9 +186,13 @@ Regime main_regime(const PointSummary& summary) {
 
 bool is_doubtful(const PointSummary& summary) {
     const PointMean& cover = summary.statistics[statistic_index("cover")];
-    if (!std::isfinite(cover.mean) || cover.errors_differ) return true;
-    const double half = (cover.high - cover.low) / 2;
-    return !std::isfinite(half) || half > kWideInterval * cover.mean;
+    return !std::isfinite(cover.mean) || cover.errors_differ || !std::isfinite(cover.high - cover.low) ||
+           has_wide_interval(summary);
+}
+
+bool has_wide_interval(const PointSummary& summary) {
+    const PointMean& cover = summary.statistics[statistic_index("cover")];
+    return (cover.high - cover.low) / 2 > kWideInterval * cover.mean;  // false where there is none
 }
 
 std::string figure(std::string_view drawing, std::string_view caption, std::string_view kind) {

@@ -72,6 +72,9 @@ Regime main_regime(const PointSummary& summary);
 // Returns true where the mean needs care: none, an interval wider than a tenth of it to either side, or errors that differ.
 bool is_doubtful(const PointSummary& summary);
 
+// Returns whether the 95 % interval of cover is wider than a tenth of its mean to each side.
+bool has_wide_interval(const PointSummary& summary);
+
 // Wraps a drawing: <figure> with a caption, both HTML.
 std::string figure(std::string_view drawing, std::string_view caption, std::string_view kind = {});
 

@@ -94,6 +94,33 @@ class Fields(Kept):
             self.assertAlmostEqual(level["east_m_per_s"], -8, 5, f"{key}\n{scene.read_text(encoding='utf-8')}")
             self.assertAlmostEqual(level["north_m_per_s"], 0, 5)
 
+    def test_numbers_that_a_search_shows_are_recorded_together(self):
+        """Where the key frame of before stays in sight: both are in the new one; and a signal keeps the same."""
+        scene = self.folder / "w.toml"
+        levels = "[{ height_m = 500, from_deg = 270, speed_m_per_s = 4 }, { height_m = 1000, from_deg = 270, speed_m_per_s = 6 }]"
+        text = f'seed = 4\n[lattice]\ncells = [16, 16, 12]\n[[wind]]\nlevels = {levels}\n'
+        script = RECORD_WIND[:RECORD_WIND.index("click wind")] + 'click "tab Properties"\nclick find\ntype speed_m\nwait 0.4\n'
+        for n, speed in ((0, 11), (1, 17)):
+            script += f"double-click-at wind[0].levels[{n}].speed_m_per_s 0.5 0.5\nkey CTRL+A\ntype {speed}\nwait 0.2\n" + "key ENTER\nwait 0.4\n" * (n == 0)
+        scene.write_text(text, encoding="utf-8")
+        kept = self.keep_by_signal(scene, script)
+        self.edit(scene, script=script + "key ENTER\nwait 0.4\nkey CTRL+S\nwait 0.5\n")
+        saved = scene.read_text(encoding="utf-8")
+        self.assertEqual([round(level["east_m_per_s"], 6) if "east_m_per_s" in level else level["speed_m_per_s"]
+                          for level in tomllib.loads(saved)["wind"][-1]["levels"]], [11, 17], saved)
+        self.assertEqual(saved, kept)
+
+    def test_what_is_recorded_on_the_way_to_a_step_is_of_that_step(self):
+        """While the simulation is made anew up to what the time line shows: the steps that were seen keep their wind."""
+        scene = self.folder / "w.toml"
+        scene.write_text("seed = 4\n[lattice]\ncells = [192, 192, 48]\n" + WIND[WIND.index("[[wind]]"):], encoding="utf-8")
+        self.edit(scene, script="wait-step 30\nkey SPACE\nwait 0.5\nclick scene\nclick \"tab Properties\"\nwait 0.3\nset seed 5\n"
+                                'click "tab View"\nclick "Record as key frames"\nclick wind\nclick wind[0]\nclick "tab Properties"\nwait 0.2\n'
+                                'drag "hodograph 0" 20 10\nwait 0.3\nkey CTRL+S\nwait 0.5\n')
+        saved = tomllib.loads(scene.read_text(encoding="utf-8"))
+        self.assertGreaterEqual(saved["wind"][1]["time_s"], 300, saved["wind"])
+        self.assertLessEqual(len(saved["wind"]), 3, "one drag")
+
     def test_a_handle_moves_one_coordinate(self):
         scene = self.folder / "h.toml"
         text = ('seed = 4\n[lattice]\ncells = [32, 32, 24]\ncell_size_m = 100\n[field]\nellipsoids = [{ centre_m = [0.123456, 0.654321, 1200.5], '
