@@ -24,10 +24,21 @@ namespace {
 
 constexpr double kLayersTolerance = 1e-3;
 
+// Returns the largest density that a file may hold: 1, and of refined files with detail what its thermals, a noise of mean 1, make
+// of it.
+double largest_density(const Scene& scene) {
+    if (scene.density.refine == 1) return 1;
+    const auto of = [](const DetailOptions& detail) { return detail.enabled ? 1 + detail.thermals : 1; };
+    double most = scene.layers.empty() ? of(scene.density.detail) : 1;
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) most = std::max(most, of(layer_detail(scene, n)));
+    constexpr double kRounding = 1e-6;
+    return most + (most > 1 ? kRounding : 0);
+}
+
 // Judges the density of each file as a reader sees it.
 class Decoder {
   public:
-    explicit Decoder(const RunListing& run) : run_(run) {}
+    explicit Decoder(const RunListing& run) : run_(run), most_of_scene_(largest_density(run.scene)) {}
 
     void unreadable(const Error& error) { voxels_.add(error.what()); }
 
@@ -36,7 +47,8 @@ class Decoder {
         for (const std::string& note : loaded.notes) values_.add(file.path + ": " + note);
         const float most = loaded.density.max_value();
         largest_ = std::max(largest_, double(most));
-        if (most > 1) values_.add(fmt::format("{}: a value of {:g} is above 1", file.path, most));
+        if (most > most_of_scene_)
+            values_.add(fmt::format("{}: a value of {:g} is above {:g}", file.path, most, most_of_scene_));
         if (!file.voxels.empty() && voxel_digest(loaded.density) != file.voxels)
             voxels_.add(file.path + ": its voxels are not those of the manifest");
         check_metadata(frame, file, loaded);
@@ -87,6 +99,7 @@ class Decoder {
     }
 
     const RunListing& run_;
+    double most_of_scene_;
     Problems voxels_, values_, geometry_, metadata_;
     std::map<std::string, VdbGridInfo> first_;
     std::size_t count_ = 0;

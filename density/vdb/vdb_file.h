@@ -11,7 +11,7 @@
 // clang-format off
 //
 //     grid          type            content
-//     density       float, half     fog volume, 0..1; the two extreme corners are active with value 0
+//     density       float, half     fog volume, 0..1, with detail somewhat above; the two extreme corners are active with value 0
 //     hum act cld   bool            active and true where the bit is 1; on request
 //     vel           vec3s           wind in m/s (east, north, up), in the whole box, in voxels of velocity_voxel(); on request
 //

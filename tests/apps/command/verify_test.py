@@ -74,6 +74,16 @@ class Verify(Case):
                 self.assertEqual((self.folder / "out" / file["path"]).stat().st_size, file["bytes"])
         self.assertEqual([f["path"] for f in manifest["run_files"]], ["statistics.csv", "checkpoint.nephos"])
 
+    def test_refined_files_of_dense_cloud(self):
+        """Whose thermals make them denser than 1."""
+        dense = self.write("dense.toml", "seed = 5\n[lattice]\ncells = [24, 24, 16]\n[time]\nsteps = 16\n[frames]\nstart_s = 120\ncount = 2\n[field]\n"
+                           "background = { hum = 0.3, act = 0.03, ext = 0.02 }\n[density]\nrefine = 2\n")
+        self.call("run", dense, "--no-render", "--out", "dense")
+        largest = float(self.checks("dense")["values"]["detail"].split("to ")[1])
+        self.assertTrue(1 < largest <= 1.5, largest)
+        self.call("run", dense, "--no-render", "--set", "detail.enabled=false", "--out", "smooth")
+        self.assertLessEqual(float(self.checks("smooth")["values"]["detail"].split("to ")[1]), 1)
+
     @unittest.skipUnless(shutil.which("strace"), "strace is not installed")
     def test_what_cannot_be_read_is_not_false(self):
         """Neither a reader that the system refuses nor one that it gives no memory says anything of a file."""
