@@ -66,8 +66,9 @@ void finish_recorded_value(Editor& editor) {
 
 void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging,
                 NumberForm form) {
-    TextPath path = recorded_place(editor, table);
+    TextPath path = table;
     path.push_back({entries.front().first, 0});
+    path = recorded_place(editor, path);
     const std::string name = path_text(path);
     const auto changed = [&](std::string text) {
         for (const auto& [key, value] : entries) {

@@ -150,7 +150,11 @@ std::string with_sun_keys(std::string text, const Scene& scene, const std::vecto
 }
 
 // The step of the picture that is shown: what it shows is decided by the newest change.
-std::uint64_t shown_step(const Editor& editor) { return editor.picture ? editor.picture->step : 0; }
+std::uint64_t shown_step(const Editor& editor) {
+    const LiveStatus status = editor.live->status();
+    if (!status.running && status.goal > status.step) return status.goal;  // on the way there
+    return editor.picture ? editor.picture->step : 0;
+}
 
 std::string with_recorded_sun(const Editor& editor, const std::string& text, const SunKey& wanted,
                               std::uint64_t step) {
@@ -279,7 +283,7 @@ bool record_wind(Editor& editor, const TextPath& path, const std::string& edited
     TextPath now = frame;
     now.back().index = recorded->keys - 1;
     const bool goes_on = editor.followed_rows && editor.followed_rows->now == frame;
-    editor.followed_rows = {now, goes_on ? editor.followed_rows->before : frame, from};
+    editor.followed_rows = {now, goes_on ? editor.followed_rows->before : frame};
     return true;
 }
 
@@ -305,13 +309,19 @@ bool is_recorded(const Editor& editor, const TextPath& path) {
 }
 
 TextPath recorded_place(const Editor& editor, const TextPath& path) {
-    const auto& followed = editor.followed_rows;
-    if (!followed || !editor.record || editor.filter.empty() || path.size() < followed->before.size() ||
-        !std::equal(followed->before.begin(), followed->before.end(), path.begin()) ||
-        editor.document->current_scene() == nullptr || followed->step != step_of_next_change(editor))
-        return path;
-    TextPath out = followed->now;
-    out.insert(out.end(), path.begin() + std::ptrdiff_t(followed->before.size()), path.end());
+    const Scene* const scene = editor.document->current_scene();
+    const bool is_search = editor.record && !editor.filter.empty() && scene != nullptr && is_of_wind(path);
+    const std::size_t frame = wind_array(path).size(), level = frame + 2;
+    if (!is_search || path.size() <= level || path[level - 1].name != "levels") return path;
+    const double now_s = double(step_of_next_change(editor)) * scene->automaton.time_step_s;
+    const std::vector<WindKeyframe>& keys = wind_at_path(*scene, wind_array(path)).keyframes;
+    const auto later = std::ranges::upper_bound(keys, now_s, {}, &WindKeyframe::time_s);
+    const auto newest = std::size_t(later - keys.begin()), index = path[frame].index, at = path[level].index;
+    if (newest == 0 || index + 1 >= newest) return path;
+    const std::vector<WindLevel>&of = keys[index].levels, &now = keys[newest - 1].levels;
+    if (at >= of.size() || at >= now.size() || of[at].height_m != now[at].height_m) return path;
+    TextPath out = path;
+    out[frame].index = newest - 1;
     return out;
 }
 

@@ -113,9 +113,7 @@ bool starts_with(const TextPath& path, const TextPath& beginning) {
 
 // Returns by what ImGui knows the field of a key.
 std::string row_id(const Editor& editor, const TextPath& path) {
-    const bool is_followed =
-        editor.followed_rows && editor.filter.empty() && starts_with(path, editor.followed_rows->now);
-    if (!is_followed) return path_text(path);
+    if (!editor.followed_rows || !starts_with(path, editor.followed_rows->now)) return path_text(path);
     TextPath id = editor.followed_rows->before;
     id.insert(id.end(), path.begin() + std::ptrdiff_t(editor.followed_rows->now.size()), path.end());
     return path_text(id);
@@ -346,9 +344,8 @@ std::size_t models_from_files(const Editor& editor) {
 
 void properties_panel(Editor& editor) {
     leave_missing_element(editor);
-    const bool is_followed =
-        editor.followed_rows &&
-        (!editor.filter.empty() || starts_with(editor.selected, editor.followed_rows->now));
+    const bool is_followed = editor.followed_rows && editor.filter.empty() &&
+                             starts_with(editor.selected, editor.followed_rows->now);
     if (!is_followed) editor.followed_rows.reset();
     ImGui::SetNextItemWidth(-1);
     input_text("##filter", editor.filter, "Find a key of the scene");

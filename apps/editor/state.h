@@ -219,11 +219,9 @@ struct Editor : OpenScene {
         std::optional<std::string> before;  // of one that key frames stand for
     };
     std::optional<RecordedValue> recorded_value;
-    // The key frame that recording has made of another one, whose fields it goes on with: the caret stays. In a search, where the
-    // other one is still seen, what is recorded of it at the same step is of the new one, too.
+    // The key frame that recording has chosen in the place of another one, whose fields it goes on with: the caret stays.
     struct FollowedRows {
         TextPath now, before;
-        std::uint64_t step = 0;
     };
     std::optional<FollowedRows> followed_rows;
     // Keeps what fields show of keys that key frames stand for, by their paths. It stands still while a number has the caret,
@@ -382,7 +380,8 @@ bool record_live(Editor& editor, const TextPath& path, const std::string& edited
 // Returns whether a change of a key is to be recorded: while the user records, and always of a sun with key frames, which
 // stand in the place of the key.
 bool is_recorded(const Editor& editor, const TextPath& path);
-// Returns the path of the key that a recorded change of a key is made in: that of a key frame which was made of its own at this step.
+// Returns the path of the key that a recorded change is made in. In a search, where earlier key frames of a wind stay in sight, it is
+// that of the newest one, which holds at the present step; otherwise the path itself.
 TextPath recorded_place(const Editor& editor, const TextPath& path);
 // Returns whether a key would be recorded were it not for problems of the text: it is then not changed at all.
 bool is_kept_from_recording(const Editor& editor, const TextPath& path);

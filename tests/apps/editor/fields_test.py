@@ -110,6 +110,31 @@ class Fields(Kept):
                           for level in tomllib.loads(saved)["wind"][-1]["levels"]], [11, 17], saved)
         self.assertEqual(saved, kept)
 
+    def test_a_search_after_undo_between_winds_and_of_times(self):
+        """The key frame that was made is gone; another wind is recorded in between; the time of a key frame is its own."""
+        scene = self.folder / "w.toml"
+        levels = "levels = [{ height_m = 500, from_deg = 270, speed_m_per_s = 4 }, { height_m = 1000, from_deg = 270, speed_m_per_s = 6 }]"
+        model = '[[model]]\nname = "a"\nseeds = [{ position_m = [0, 0, 200], size_m = [300, 200, 150] }]\n[[sky]]\nname = "fair"\nstate = 0\nclouds = 1\nmodels = ["a"]\n'
+        text = ("seed = 4\n[lattice]\ncells = [16, 16, 12]\n[time]\nstep_s = 2\nsteps = 40\n" + model +
+                "".join(f'[[layer]]\nname = "{name}"\nskies = ["fair"]\nbase_height_m = 200\nlattice = {{ cells = [16, 16, 8] }}\n[[layer.wind]]\ntime_s = 0\n{levels}\n'
+                        for name in ("low", "high")))
+        script = RECORD_WIND[:RECORD_WIND.index("click wind")] + 'click "tab Properties"\nclick find\ntype speed_m\nwait 0.4\n'
+        def typed(layer, level, speed, key="speed_m_per_s"):
+            place = f"levels[{level}].{key}" if key != "time_s" else key
+            return f"double-click-at layer[{layer}].wind[0].{place} 0.5 0.5\nkey CTRL+A\ntype {speed}\nwait 0.2\nkey ENTER\nwait 0.4\n"
+        def winds(do):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script=f"{script}{do}key CTRL+S\nwait 0.5\n")
+            saved = tomllib.loads(scene.read_text(encoding="utf-8"))
+            return [[(key["time_s"], [round(level.get("east_m_per_s", level.get("speed_m_per_s")), 3) for level in key["levels"]]) for key in layer["wind"]]
+                    for layer in saved["layer"]]
+        low, high = winds(typed(0, 0, 11) + typed(1, 0, 12) + typed(0, 1, 13))
+        self.assertEqual((low[-1][1], high[-1][1]), ([11, 13], [12, 6]))
+        low, high = winds(typed(0, 0, 11) + "click scene\nwait 0.2\nkey CTRL+Z\nwait 0.3\n" + typed(0, 1, 17))
+        self.assertEqual((low[-1][1], len(low), len(high)), ([4, 17], 3, 1))
+        low, _ = winds(typed(0, 0, 11) + "click find\nkey CTRL+A\ntype wind[\nwait 0.4\n" + typed(0, 0, 3, "time_s"))
+        self.assertEqual(low[0][0], 3, low)
+
     def test_what_is_recorded_on_the_way_to_a_step_is_of_that_step(self):
         """While the simulation is made anew up to what the time line shows: the steps that were seen keep their wind."""
         scene = self.folder / "w.toml"
