@@ -55,9 +55,9 @@ void finish_recorded_value(Editor& editor) {
     bool is_other = false;  // not where it was changed back
     attempt(editor, [&] {
         const std::string& text = editor.document->text();
-        is_other = done.before
-                       ? *done.before != done.value
-                       : with_value(text, recorded_place(editor, done.path), done.value, done.form) != text;
+        is_other = done.before ? *done.before != done.value
+                               : with_value(text, recorded_place(editor, done.path).value_or(done.path),
+                                            done.value, done.form) != text;
     });
     if (is_other)
         set_values(editor, TextPath(done.path.begin(), done.path.end() - 1),
@@ -68,7 +68,13 @@ void set_values(Editor& editor, const TextPath& table, const std::vector<TextEnt
                 NumberForm form) {
     TextPath path = table;
     path.push_back({entries.front().first, 0});
-    path = recorded_place(editor, path);
+    const std::optional<TextPath> place = recorded_place(editor, path);
+    if (!place)
+        return say(editor,
+                   entries.front().second + " of " + path_text(path) +
+                       " is not set: another key frame holds at this step, which has no level at that height",
+                   true);
+    path = *place;
     const std::string name = path_text(path);
     const auto changed = [&](std::string text) {
         for (const auto& [key, value] : entries) {

@@ -152,8 +152,7 @@ std::string with_sun_keys(std::string text, const Scene& scene, const std::vecto
 // The step of the picture that is shown: what it shows is decided by the newest change.
 std::uint64_t shown_step(const Editor& editor) {
     const LiveStatus status = editor.live->status();
-    if (!status.running && status.goal > status.step) return status.goal;  // on the way there
-    return editor.picture ? editor.picture->step : 0;
+    return status.running && editor.picture ? editor.picture->step : status.goal;  // as the time line
 }
 
 std::string with_recorded_sun(const Editor& editor, const std::string& text, const SunKey& wanted,
@@ -308,7 +307,7 @@ bool is_recorded(const Editor& editor, const TextPath& path) {
            !editor.shown_scene->sun_path.empty();
 }
 
-TextPath recorded_place(const Editor& editor, const TextPath& path) {
+std::optional<TextPath> recorded_place(const Editor& editor, const TextPath& path) {
     const Scene* const scene = editor.document->current_scene();
     const bool is_search = editor.record && !editor.filter.empty() && scene != nullptr && is_of_wind(path);
     const std::size_t frame = wind_array(path).size(), level = frame + 2;
@@ -319,7 +318,7 @@ TextPath recorded_place(const Editor& editor, const TextPath& path) {
     const auto newest = std::size_t(later - keys.begin()), index = path[frame].index, at = path[level].index;
     if (newest == 0 || index + 1 >= newest) return path;
     const std::vector<WindLevel>&of = keys[index].levels, &now = keys[newest - 1].levels;
-    if (at >= of.size() || at >= now.size() || of[at].height_m != now[at].height_m) return path;
+    if (at >= of.size() || at >= now.size() || of[at].height_m != now[at].height_m) return std::nullopt;
     TextPath out = path;
     out[frame].index = newest - 1;
     return out;

@@ -305,7 +305,7 @@ std::string text_with_typed(const Editor& editor) {
     try {
         const Node& values = editor.document->values();
         if (const auto& recorded = editor.recorded_value) {
-            const TextPath path = recorded_place(editor, recorded->path);
+            const TextPath path = recorded_place(editor, recorded->path).value_or(recorded->path);
             const std::string edited =
                 with_value_of_wind(text, values, path, recorded->value, recorded->form);
             try {

@@ -381,8 +381,8 @@ bool record_live(Editor& editor, const TextPath& path, const std::string& edited
 // stand in the place of the key.
 bool is_recorded(const Editor& editor, const TextPath& path);
 // Returns the path of the key that a recorded change is made in. In a search, where earlier key frames of a wind stay in sight, it is
-// that of the newest one, which holds at the present step; otherwise the path itself.
-TextPath recorded_place(const Editor& editor, const TextPath& path);
+// that of the newest one, which holds at the present step: nothing where that has no such level. Otherwise it is the path itself.
+std::optional<TextPath> recorded_place(const Editor& editor, const TextPath& path);
 // Returns whether a key would be recorded were it not for problems of the text: it is then not changed at all.
 bool is_kept_from_recording(const Editor& editor, const TextPath& path);
 // Returns the text that record_live() would make now; `edited` for keys that cannot be recorded.

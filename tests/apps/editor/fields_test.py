@@ -132,6 +132,10 @@ class Fields(Kept):
         self.assertEqual((low[-1][1], high[-1][1]), ([11, 13], [12, 6]))
         low, high = winds(typed(0, 0, 11) + "click scene\nwait 0.2\nkey CTRL+Z\nwait 0.3\n" + typed(0, 1, 17))
         self.assertEqual((low[-1][1], len(low), len(high)), ([4, 17], 3, 1))
+        # A level at another height is told, and takes nothing away.
+        low, _ = winds(typed(0, 0, 11) + "click find\nkey CTRL+A\ntype wind[\nwait 0.4\n" + typed(0, 1, 1100, "height_m") + typed(0, 1, 13) +
+                       "expect-control refusal\n")
+        self.assertEqual((low[-1][1], low[0][1]), ([11, 6], [4, 6]))
         low, _ = winds(typed(0, 0, 11) + "click find\nkey CTRL+A\ntype wind[\nwait 0.4\n" + typed(0, 0, 3, "time_s"))
         self.assertEqual(low[0][0], 3, low)
 
