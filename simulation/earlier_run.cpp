@@ -281,7 +281,6 @@ void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<std::fil
 void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& settings) {
     const EarlierRun earlier = read_manifest(folder.manifest());
     if (!earlier.complete) {
-        if (earlier.frames_hash.empty()) return;  // of an earlier version
         for (const std::filesystem::path& file : earlier_files(folder)) {
             const bool is_place =
                 is_frame_place(folder, settings.scene, settings.range, settings.render, file);

@@ -52,7 +52,7 @@ bool is_frame_place(const RunFolder& folder, const Scene& scene, const Simulatio
 }
 
 bool names_hash(const std::filesystem::path& file, const std::string& hash) {
-    constexpr std::size_t kMostOfMetadata = 16384;
+    constexpr std::size_t kMostOfMetadata = 4096;
     return type_behind(file) == std::filesystem::file_type::regular &&
            read_beginning(file, kMostOfMetadata).find(hash) != std::string::npos;
 }
@@ -112,7 +112,7 @@ std::optional<std::string> OwnFiles::why_foreign(const std::filesystem::path& fi
         return std::nullopt;  // nothing is in it
     const auto listed = listed_.find(path);
     const auto table = std::ranges::find(run_.tables, path, &FileRecord::path);
-    const bool is_frame = is_frame_of(own->filename().string(), folder_.name) && !run_.frames_hash.empty();
+    const bool is_frame = is_frame_of(own->filename().string(), folder_.name);
     const bool is_right = listed != listed_.end()      ? has_content(*own, listed->second, true)
                           : table != run_.tables.end() ? has_content(*own, table->digest, false)
                           : is_frame                   ? names_hash(*own, run_.frames_hash)

@@ -141,7 +141,7 @@ bool encode(const Simulation& simulation, RunRecorder& recorder, const RunSettin
     return true;
 }
 
-// What a run holds of its folder while it is at work, and the earlier files that it takes the place of.
+// Keeps what a run holds of its folder while it is at work, and names the earlier files that it takes the place of.
 struct Claim {
     HeldFolders held;
     std::vector<std::filesystem::path> replaced;

@@ -14,22 +14,24 @@
 
 namespace nephos {
 
-// Returns the folders in that of a run that it writes to, each once, also those that are not there yet; `pictures`: of its frames.
+// Returns the folders in that of a run that it writes to, each once, also those that are not there yet;
+// `pictures`: of its frames.
 std::vector<std::filesystem::path> parts_of_run(const RunFolder& folder, const Scene& scene,
                                                 const SimulationRange& range, bool pictures);
 
-// Throws Error(usage) where the density folders of two layers are one, by links or on a disk for which upper and lower case are the
-// same: the frames of one layer would replace those of the other.
+// Throws Error(usage) where the density folders of two layers are one, by links or on a disk for which upper
+// and lower case are the same: the frames of one layer would replace those of the other.
 void refuse_shared_density_folders(const RunFolder& folder, const Scene& scene);
 
-// Locks on folders, each of which is locked once by whatever path it is reached. They last as long as this lives.
+// Locks on folders, each of which is locked once by whatever path it is reached. They last as long as this
+// lives.
 class HeldFolders {
   public:
     // `own`: the folder of the run, which `lock` is of.
     HeldFolders(const std::filesystem::path& own, const FolderLock& lock);
 
-    // Locks a folder, and returns whether it was not known before; does nothing where there is none. Throws Error(io) when another run
-    // or export writes into it.
+    // Locks a folder, and returns whether it was not known before; does nothing where there is none. Throws
+    // Error(io) when another run or export writes into it.
     bool hold(const std::filesystem::path& folder);
     // Returns whether a folder is locked, and tries to lock it. False, too, on file systems without locks.
     bool can_hold(const std::filesystem::path& folder);

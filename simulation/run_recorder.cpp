@@ -106,8 +106,7 @@ void RunRecorder::take_over(const Simulation& simulation) {
         if (frame.files.empty()) frame.files = digests_of_frame(frame.number);
         for (const FileRecord& file : frame.files) {
             require_size(file);
-            const bool names_state =
-                file.path.ends_with(".vdb") && settings_.scene.layers.empty() && !earlier.frames_hash.empty();
+            const bool names_state = file.path.ends_with(".vdb") && settings_.scene.layers.empty();
             if (names_state && !names_hash(folder_.folder / file.path, frame.state_hash.hex()))
                 throw Error(ErrorCode::io,
                             fmt::format("{}: is of another state than the frame that was written: start anew "

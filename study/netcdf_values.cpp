@@ -68,7 +68,8 @@ bool is_real(NetcdfType type) { return type == NetcdfType::float32 || type == Ne
                                            attribute, shortened(variable.name), message));
 }
 
-// Returns an attribute with that many numbers, with any number of them if `count` is 0; null where there is none.
+// Returns an attribute with that many numbers, with any number of them if `count` is 0; null where there is
+// none.
 const NetcdfAttribute* find(const PackedVariable& variable, const std::filesystem::path& path,
                             const std::string& name, std::size_t count) {
     const auto found = variable.attributes.find(name);
@@ -156,8 +157,9 @@ double NetcdfPacking::operator()(double packed) const {
     return checked >= low_ && checked <= high_ ? value : std::nan("");
 }
 
-// The range is of packed values, unless it has the type of the unpacked ones and that is the wider, or is of real numbers where the
-// packed ones are whole. `unpacked_type`: of scale_factor and add_offset; none where there are none.
+// The range is of packed values, unless it has the type of the unpacked ones and that is the wider, or is of
+// real numbers where the packed ones are whole. `unpacked_type`: of scale_factor and add_offset; none where
+// there are none.
 void NetcdfPacking::set_range(const PackedVariable& variable, NetcdfType unpacked_type,
                               const std::filesystem::path& path) {
     const auto is_unpacked = [&](const NetcdfAttribute& attribute) {

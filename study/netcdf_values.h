@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Values of NetCDF classic files as numbers: their types, and what the attributes of a variable say of them (NetCDF Users Guide,
-// "Attribute Conventions"). Functions and const objects are safe to call from several threads.
+// Values of NetCDF classic files as numbers: their types, and what the attributes of a variable say of them
+// (NetCDF Users Guide, "Attribute Conventions"). Functions and const objects are safe to call from several
+// threads.
 
 #include <cstdint>
 #include <filesystem>
@@ -19,8 +20,8 @@ bool is_known(NetcdfType type);  // the types of a file are numbers that may be 
 // Returns the bytes that a value of a known type takes in a file.
 std::uint64_t size_of(NetcdfType type);
 
-// The values of an attribute as numbers, or its text: the first kMostOfAttribute, as in memory they take up to 8 bytes for each of
-// the file.
+// The values of an attribute as numbers, or its text: the first kMostOfAttribute, as in memory they take up
+// to 8 bytes for each of the file.
 struct NetcdfAttribute {
     NetcdfType type{};
     std::vector<double> values;
@@ -29,15 +30,16 @@ struct NetcdfAttribute {
 };
 inline constexpr std::uint64_t kMostOfAttribute = 10'000;
 
-// How a file holds the values of a variable.
+// Describes how a file holds the values of a variable.
 struct PackedVariable {
     std::string name;
     NetcdfType type{};
     std::map<std::string, NetcdfAttribute> attributes;
 };
 
-// NetCDF classic has no unsigned types but in CDF-5: the attribute _Unsigned says that a variable is meant so, and with it those
-// of its attributes of the same type that are values of it. Changes their types and values.
+// NetCDF classic has no unsigned types but in CDF-5: the attribute _Unsigned says that a variable is meant
+// so, and with it those of its attributes of the same type that are values of it. Changes their types and
+// values.
 void take_as_unsigned(PackedVariable& variable);
 
 // Which values of a variable are missing, and how the others were packed into small whole numbers:

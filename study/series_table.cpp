@@ -49,7 +49,7 @@ NetcdfAttributes described(std::string_view unit, std::string_view definition,
 class UnpackedSeries {
   public:
     UnpackedSeries(const Records& records, std::size_t runs) : records_(records), kept_(runs) {}
-    // What is returned lives until the next call.
+    // Returns the values, which live until the next call.
     const std::vector<float>& of(std::size_t run, const RunRecord& record) {
         if (!kept_[run].empty()) return kept_[run];
         std::vector<float> values = records_.series(record);

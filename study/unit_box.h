@@ -21,8 +21,9 @@ struct UnitBox {
     UnitBox grown(double factor) const;
 };
 
-// Returns whether points, one after the other, reach to all sides of a box. None lies on a side of the cube itself, where the prior
-// ends: such a side is reached when points that fill the box could leave that gap, two of their spacings.
+// Returns whether points, one after the other, reach to all sides of a box. None lies on a side of the cube
+// itself, where the prior ends: such a side is reached when points that fill the box could leave that gap,
+// two of their spacings.
 bool surround(const std::vector<double>& points, const UnitBox& box);
 
 }  // namespace nephos

@@ -79,10 +79,7 @@ void set_values(Editor& editor, const TextPath& table, const std::vector<TextEnt
     const auto changed = [&](std::string text) {
         for (const auto& [key, value] : entries) {
             path.back().name = key;
-            // Of several keys the caller knows the form.
-            text = entries.size() == 1
-                       ? with_value_of_wind(text, editor.document->values(), path, value, form)
-                       : with_value(text, path, value, form);
+            text = with_value_of_wind(text, editor.document->values(), path, value, form);
         }
         return text;
     };

@@ -46,7 +46,7 @@ std::string with_key_frames(std::string text, const TextPath& path, const std::v
         text = without(text, path);
         old = 0;
     }
-    // From the last to the first: the places of those before stay.
+    // Goes from the last to the first, so that the places of those before stay.
     while (old > 0 || next > 0) {
         const bool is_removed = next == 0 || (old > 0 && now_there[old - 1].time_s > wanted[next - 1].time_s);
         const bool is_new = !is_removed && (old == 0 || now_there[old - 1].time_s < wanted[next - 1].time_s);

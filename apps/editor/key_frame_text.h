@@ -16,9 +16,10 @@ struct KeyFrame {
     std::vector<TextEntry> entries;
 };
 
-// Returns the text with other key frames at a path ("wind", "layer[0].wind", "sun.path"); `now_there`: those that it has. Both rise in
-// time. What stays of them is not touched, nor what their author wrote beside it. Where the text has no such elements, as their
-// values come from elsewhere, all are added. Throws Error(usage) as with_value().
+// Returns the text with other key frames at a path ("wind", "layer[0].wind", "sun.path"); `now_there`: those
+// that it has. Both rise in time. What stays of them is not touched, nor what their author wrote beside it.
+// Where the text has no such elements, as their values come from elsewhere, all are added. Throws
+// Error(usage) as with_value().
 std::string with_key_frames(std::string text, const TextPath& path, const std::vector<KeyFrame>& now_there,
                             const std::vector<KeyFrame>& wanted);
 

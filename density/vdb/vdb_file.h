@@ -102,6 +102,10 @@ struct VdbContent {
     std::function<void()> publish_check;
 };
 
+// Returns how many voxels `factor` times as large a cell has along each axis, which had `refine`: at least one, too, where such a voxel is
+// larger than a cell or a cell is no whole number of them.
+inline int coarser_refine(int refine, int factor) { return refine % factor == 0 ? refine / factor : 1; }
+
 // Returns the edge of the voxels of the wind over a box of voxels: 1, or the least power of two with which they are no more than
 // 2^24, in blocks of 8 x 8 x 8.
 int velocity_voxel(const Extent& voxels);

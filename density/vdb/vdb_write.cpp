@@ -36,7 +36,7 @@ class CheckedArchive : public openvdb::io::Archive {
 // Geometry of a grid: all of a file share it, but for that of the wind over large boxes.
 struct GridGeometry {
     Extent voxels;
-    int refine = 1;       // voxels per cell and axis; 1, too, where a voxel is larger than a cell
+    int refine = 1;       // voxels per cell and axis, as coarser_refine() counts them
     Placement placement;  // of the voxels
     double shift_voxels = 0;  // added to the places that are written, along each axis, in voxels of this grid
     int coarsening = 1;       // edge of a voxel here, in voxels of density
@@ -181,8 +181,7 @@ GridGeometry geometry_of_wind(const GridGeometry& density) {
     wind.voxels = {fewer(density.voxels.x), fewer(density.voxels.y), fewer(density.voxels.z)};
     wind.placement.cell_size_m *= edge;
     wind.coarsening = edge;
-    // Of coarser voxels there are fewer to a cell, or a cell is less than one of them.
-    wind.refine = density.refine % edge == 0 ? density.refine / edge : 1;
+    wind.refine = coarser_refine(density.refine, edge);
     return wind;
 }
 
@@ -324,7 +323,7 @@ void write_file(const std::filesystem::path& temporary, const std::filesystem::p
     }
 }
 
-// Of a grid of the wind: 2^24 voxels.
+// Limits a grid of the wind to 2^24 voxels.
 constexpr double kMostVelocityBlocks = 32768;
 
 }  // namespace

@@ -47,10 +47,8 @@ void write_vdb_file(const std::filesystem::path& path, const ExportOptions& opti
     if (!loaded.metadata) metadata.nephos_version = version();
     content.half_voxel_shift = options.half_voxel_shift;
     content.density = &density;
-    // Of coarser voxels there are fewer to a cell, or a cell is less than one of them.
-    const int factor = s.layout.factor, refine = loaded.refine % factor == 0 ? loaded.refine / factor : 1;
     content.cells = density.placement();
-    content.cells.cell_size_m *= refine;
+    content.cells.cell_size_m *= coarser_refine(loaded.refine, s.layout.factor);
     content.half = options.type == VoxelType::r16f;
     if (!options.velocity_name.empty() && (!metadata.wind.empty() || !s.wind_fields.empty())) {
         Wind wind;
