@@ -96,7 +96,6 @@ bool AutosaveFile::is_in_place() const {
 
 void AutosaveFile::claim(const fs::path& folder, const std::string& name) {
     constexpr int kAttempts = 1000;
-    create_folders(folder);
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
         const fs::path path = numbered(folder, name, attempt);
         // Readable by this user alone, as the scene may be private.

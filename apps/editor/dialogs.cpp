@@ -42,6 +42,9 @@ std::string extension_of(const Editor& editor, FileDialog dialog) {
 // Returns whether the dialog asks for a file that is there.
 bool is_reading(FileDialog dialog) { return dialog == FileDialog::open || dialog == FileDialog::choose; }
 
+// Returns whether a file is no scene, but a grid that one can start from.
+bool is_grid(const fs::path& path) { return path.extension() == ".vdb"; }
+
 // Does with the chosen file what the dialog was opened for.
 bool accept(Editor& editor, const fs::path& path) {
     try {
@@ -270,7 +273,9 @@ void ask_before(Editor& editor, Pending what, fs::path path) {
     editor.opens_beside = beside;
     editor.pending = what;
     editor.pending_path = std::move(path);
-    if (editor.opens_beside || !editor.document->is_modified()) do_pending(editor);
+    editor.document->look_at_disk();  // it may be gone since
+    const bool replaces = !beside && !is_grid(editor.pending_path);
+    if (!replaces || !editor.document->is_modified()) do_pending(editor);
 }
 
 void forget_pending(Editor& editor) {
@@ -320,6 +325,7 @@ void do_pending(Editor& editor) {
             editor.is_answered = true;
             for (std::size_t n = 0; n < editor.scenes.size(); ++n) {
                 const OpenScene& scene = n == editor.shown ? editor : editor.scenes[n];
+                if (n != editor.shown) scene.document->look_at_disk();
                 if (scene.is_answered || !scene.document->is_modified()) continue;
                 show_scene(editor, n);  // it is asked about next
                 editor.pending = Pending::close;
@@ -332,7 +338,7 @@ void do_pending(Editor& editor) {
             open_document(editor, std::make_unique<SceneDocument>(first_scene_text()));
         } else if (what == Pending::empty_scene) {
             open_document(editor, std::make_unique<SceneDocument>(empty_scene_text()));
-        } else if (what == Pending::open && editor.pending_path.extension() == ".vdb") {
+        } else if (what == Pending::open && is_grid(editor.pending_path)) {
             offer_grid(editor, editor.pending_path);
         } else if (what == Pending::open) {
             open(std::make_unique<SceneDocument>(editor.pending_path));

@@ -98,6 +98,19 @@ std::string autosave_all(Editor& editor) {
     return failures;
 }
 
+// Opens files that were dropped on the window, up to one about which something is asked: what is answered is of the scene
+// that is open.
+void open_dropped(Editor& editor, const std::vector<std::filesystem::path>& paths) {
+    for (const std::filesystem::path& path : paths) {
+        if (is_asking(editor))
+            return say(editor,
+                       "Not opened: " + path.filename().string() +
+                           ". A question or a dialog waits for an answer: drop it once more behind that",
+                       true);
+        ask_before(editor, Pending::open, path);
+    }
+}
+
 void look_after_files(Editor& editor) {
     const Clock::time_point now = Clock::now();
     if (now - editor.last_disk_look > std::chrono::milliseconds(700)) {
@@ -251,8 +264,8 @@ int loop(Editor& editor, Report& report) {
         for (std::filesystem::path& path : editor.window->take_dropped()) dropped.push_back(std::move(path));
         if (!dropped.empty() && !press_enter_in_field()) {  // likewise
             const std::vector<std::filesystem::path> paths = std::exchange(dropped, {});
-            if (!is_refusal_unseen(editor))  // else they can be dropped once more
-                for (const std::filesystem::path& path : paths) ask_before(editor, Pending::open, path);
+            if (!is_refusal_unseen(editor))
+                open_dropped(editor, paths);  // else they can be dropped once more
         }
         finish_field_first();
         ImGui::NewFrame();

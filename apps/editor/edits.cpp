@@ -101,22 +101,17 @@ void set_values(Editor& editor, const TextPath& table, const std::vector<TextEnt
 
 void open_document(Editor& editor, std::unique_ptr<SceneDocument> document) {
     if (editor.document) editor.document->remove_autosave();
-    editor.document = std::move(document);
+    OpenScene next;  // nothing of the scene before is left but how it is looked at
+    next.document = std::move(document);
+    next.live = std::move(editor.live);
+    next.speed = editor.speed;
+    next.view = editor.view;
+    next.view.hidden.clear();
+    static_cast<OpenScene&>(editor) = std::move(next);
+    editor.flash_on_click = false;
     editor.live->clear();  // until the scene of the new one is there, which may have problems
-    editor.picture.reset();
     editor.window->clear_picture();
-    editor.disk = SceneDocument::Disk::same;
-    editor.shown_version = 0;
-    editor.shown_scene.reset();
-    editor.start_step.reset();
-    editor.is_answered = false;
-    editor.selected.clear();
-    editor.steps.clear();
-    editor.checkpoints.clear();
-    editor.text_version = 0;
-    editor.defaults.clear();
-    editor.defaults_version = 0;
-    editor.live->run(editor.running = true);
+    editor.live->run(editor.running);
     if (editor.document->has_file()) {
         note_recent(editor.settings, editor.document->path());
         keep_settings(editor);

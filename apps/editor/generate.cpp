@@ -9,6 +9,7 @@
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
 #include "core/text.h"
+#include "scenes/format/text.h"
 #include "seeds/light_absorption.h"
 
 namespace nephos {
@@ -158,8 +159,8 @@ void keep_as_model(Editor& editor, std::size_t model, const GeneratedCloud& clou
     for (const SeedBox& box : cloud.cloud.boxes)
         seeds += (seeds.size() > 1 ? ", " : "") + seed_toml(box, from.seeds[box.seed]);
     seeds += "]";
-    const std::string name =
-        unused_name(from.name, names_of(value_node(editor.document->values(), text_path("model"))));
+    const std::string name = unused_name(from.name, taken_names(editor.document->values(), text_path("model"),
+                                                                editor.document->current_scene()));
     const TextPath added{{"model", 0}, {{}, index + 1}};
     const auto with = [](TextPath path, const char* key) {
         path.push_back({key, 0});
@@ -167,7 +168,7 @@ void keep_as_model(Editor& editor, std::size_t model, const GeneratedCloud& clou
     };
     const auto kept = [&](const std::string& before) {
         std::string text = with_copied_element(before, text_path("model"), index);
-        text = with_value(text, with(added, "name"), "\"" + name + "\"");
+        text = with_value(text, with(added, "name"), toml_string(name));
         return with_value(without(text, with(added, "seeds")), with(added, "seeds"), seeds);
     };
     if (!change_text(editor, kept, "Keep cloud " + std::to_string(cloud.number) + " of " + from.name)) return;

@@ -12,6 +12,7 @@
 #include "apps/editor/handles.h"
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
+#include "apps/editor/value_controls.h"
 #include "core/text.h"
 
 namespace nephos {
@@ -27,7 +28,14 @@ TextPath with(const TextPath& path, const char* name) {
     return out;
 }
 
-std::string number_of(const Editor& editor, double metres) { return number_text(tidy_m(editor, metres), 9); }
+// Returns a number for a key as it stands in the text: within what the key allows.
+std::string number_of(const Editor& editor, const TextPath& table, const char* name, double metres) {
+    const Key* const key = key_at(with(table, name));
+    const double tidy = tidy_m(editor, metres);
+    if (key == nullptr) return number_text(tidy, 9);
+    const bool vanishes = key->limits.above_min && tidy <= key->limits.min;  // seen from afar
+    return number_text(within_limits(key->limits, vanishes ? metres : tidy), 9);
+}
 
 // Holds a vector of which a handle has moved one number; the others keep their digits.
 struct Moved {
@@ -35,16 +43,21 @@ struct Moved {
     int axis = 0;
 };
 
-std::string vector_toml(const Editor& editor, const Moved& moved) {
+std::string vector_toml(const Editor& editor, const TextPath& table, const char* name, const Moved& moved) {
     std::string text;
     for (int axis = 0; axis < 3; ++axis)
-        text += (axis > 0 ? ", " : "[") +
-                (axis == moved.axis ? number_of(editor, moved.value[axis]) : number_text(moved.value[axis]));
+        text +=
+            (axis > 0 ? ", " : "[") + (axis == moved.axis ? number_of(editor, table, name, moved.value[axis])
+                                                          : number_text(moved.value[axis]));
     return text + "]";
 }
 
 void drag_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries) {
     set_values(editor, table, entries, true);
+}
+
+void drag_number(Editor& editor, const TextPath& table, const char* name, double metres) {
+    drag_values(editor, table, {{name, number_of(editor, table, name, metres)}});
 }
 
 constexpr Vec3 kUnits[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
@@ -93,11 +106,12 @@ void shape_handles(Editor& editor, const TextPath& table, const char* place_key,
                    const Vec3& origin, const Vec3& place, const Vec3& half, std::optional<double> yaw_deg) {
     const double arrow = 0.6 * std::max({half.x, half.y, half.z});
     if (const auto moved = place_handles(editor, origin, place, arrow))
-        drag_values(editor, table, {{place_key, vector_toml(editor, *moved)}});
+        drag_values(editor, table, {{place_key, vector_toml(editor, table, place_key, *moved)}});
     const bool whole = std::string_view(size_key) == "size_m";
     if (const auto size = size_handles(editor, origin + place, half, yaw_deg.value_or(0)))
         drag_values(editor, table,
-                    {{size_key, vector_toml(editor, {(whole ? 2.0 : 1.0) * size->value, size->axis})}});
+                    {{size_key, vector_toml(editor, table, size_key,
+                                            {(whole ? 2.0 : 1.0) * size->value, size->axis})}});
     if (!yaw_deg) return;
     if (const auto yaw = turn_handle(editor, origin + place, 1.3 * std::max(half.x, half.y), *yaw_deg))
         drag_values(editor, table, {{"yaw_deg", number_text(*yaw)}});
@@ -200,12 +214,9 @@ void placed_rain(Editor& editor, std::size_t layer, const LayerOptions& options)
         const TextPath path = text_path("layer[" + std::to_string(layer) + "].rain.placed[" + std::to_string(n) + "]");
         const Vec3 half{rain.semi_a_m, rain.semi_b_m, 0};
         if (const auto at = place_handles(editor, {}, centre, 0.6 * std::max(half.x, half.y), 2))
-            drag_values(editor, path,
-                        {{at->axis == 0 ? "x_m" : "y_m", number_of(editor, at->value[at->axis])}});
+            drag_number(editor, path, at->axis == 0 ? "x_m" : "y_m", at->value[at->axis]);
         if (const auto size = size_handles(editor, centre, half, rain.yaw_deg, 2))
-            drag_values(
-                editor, path,
-                {{size->axis == 0 ? "semi_a_m" : "semi_b_m", number_of(editor, size->value[size->axis])}});
+            drag_number(editor, path, size->axis == 0 ? "semi_a_m" : "semi_b_m", size->value[size->axis]);
         if (const auto yaw = turn_handle(editor, centre, 1.3 * std::max(half.x, half.y), rain.yaw_deg))
             drag_values(editor, path, {{"yaw_deg", number_text(*yaw)}});
     }
@@ -228,10 +239,10 @@ void scatter_gizmo(Editor& editor, const TextPath& path, const EllipsoidScatter&
     const int axis = place ? place->axis : size->axis;
     const double at = place ? place->value[axis] : centre[axis],
                  reach = size ? size->value[axis] : half[axis];
-    const std::string range =
-        low[axis] == high[axis] && !size  // flat, as it was
-            ? number_of(editor, at)
-            : "[" + number_of(editor, at - reach) + ", " + number_of(editor, at + reach) + "]";
+    const auto number = [&](double metres) { return number_of(editor, path, kRanges[axis], metres); };
+    const std::string range = low[axis] == high[axis] && !size  // flat, as it was
+                                  ? number(at)
+                                  : "[" + number(at - reach) + ", " + number(at + reach) + "]";
     drag_values(editor, path, {{kRanges[axis], range}});
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
 #include "core/text.h"
 
@@ -18,10 +19,12 @@ struct KeyMark {
     double least_s = 0, most_s = 1e15;  // between its neighbours
 };
 
-// Adds the key frames of one list.
+// Adds the key frames of one list, where the text has it: states and winds may come from other keys.
 template <typename Key>
-void add_marks(std::vector<KeyMark>& marks, const std::vector<Key>& keys, const std::string& list,
-               const char* kind, ImU32 colour, bool rises = true) {
+void add_marks(std::vector<KeyMark>& marks, const Node& values, const std::vector<Key>& keys,
+               const std::string& list, const char* kind, ImU32 colour, bool rises = true) {
+    const Node* const elements = value_node(values, text_path(list));
+    if (elements == nullptr || elements->items.size() != keys.size()) return;
     for (std::size_t n = 0; n < keys.size(); ++n) {
         KeyMark mark{keys[n].time_s, text_path(list + "[" + std::to_string(n) + "]"), kind, colour};
         if (rises && n > 0) mark.least_s = std::nextafter(keys[n - 1].time_s, 1e300);
@@ -34,18 +37,20 @@ constexpr ImU32 kWindMark = IM_COL32(78, 160, 240, 255), kClimateMark = IM_COL32
                 kSunMark = IM_COL32(245, 215, 90, 255), kFlashMark = IM_COL32(190, 150, 255, 255),
                 kCameraMark = IM_COL32(120, 200, 140, 255);
 
-std::vector<KeyMark> marks_of(const Scene& scene) {
+std::vector<KeyMark> marks_of(const Scene& scene, const Node& values) {
     std::vector<KeyMark> marks;
-    add_marks(marks, scene.automaton.wind.keyframes, "wind", "wind", kWindMark);
-    add_marks(marks, scene.climate.schedule, "climate.schedule", "climate", kClimateMark);
+    add_marks(marks, values, scene.automaton.wind.keyframes, "wind", "wind", kWindMark);
+    add_marks(marks, values, scene.climate.schedule, "climate.schedule", "climate", kClimateMark);
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
         const std::string layer = "layer[" + std::to_string(n) + "].";
-        add_marks(marks, scene.layers[n].wind.keyframes, layer + "wind", "wind of a layer", kWindMark);
-        add_marks(marks, scene.layers[n].schedule, layer + "schedule", "climate of a layer", kClimateMark);
+        add_marks(marks, values, scene.layers[n].wind.keyframes, layer + "wind", "wind of a layer",
+                  kWindMark);
+        add_marks(marks, values, scene.layers[n].schedule, layer + "climate.schedule", "climate of a layer",
+                  kClimateMark);
     }
-    add_marks(marks, scene.sun_path, "sun.path", "sun", kSunMark);
-    add_marks(marks, scene.render.lightning, "lightning", "lightning", kFlashMark, false);
-    add_marks(marks, scene.render.camera.path, "camera.path", "camera", kCameraMark);
+    add_marks(marks, values, scene.sun_path, "sun.path", "sun", kSunMark);
+    add_marks(marks, values, scene.render.lightning, "lightning", "lightning", kFlashMark, false);
+    add_marks(marks, values, scene.render.camera.path, "camera.path", "camera", kCameraMark);
     return marks;
 }
 
@@ -91,7 +96,7 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
     const Scene* const scene = editor.document->current_scene();
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || scene == nullptr) held.clear();
     if (scene == nullptr) return;
-    for (const KeyMark& mark : marks_of(*scene)) {
+    for (const KeyMark& mark : marks_of(*scene, editor.document->values())) {
         const double step = mark.time_s / step_s;
         const float x = x_of(step);
         const bool near = hovered && std::abs(mouse.x - x) < 1.6f * half,

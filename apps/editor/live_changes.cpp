@@ -397,6 +397,10 @@ void record_climate(Editor& editor, double final_state, double duration_s) {
         return say(editor, "The climate stays while the text has problems: mend them, or undo", true);
     const Held held(editor);
     const Scene& scene = *editor.document->current_scene();
+    const bool has_follower =
+        std::ranges::any_of(scene.layers, [](const LayerOptions& layer) { return layer.schedule.empty(); });
+    if (!has_follower)
+        return say(editor, "The climate stays: each layer has states of its own, layer.climate", true);
     const double step_s = scene.automaton.time_step_s, now = double(held.step) * step_s;
     const auto state_at = [&](double time_s) {
         const std::vector<StatePoint>& points = scene.climate.schedule;
@@ -445,23 +449,6 @@ void add_flash(Editor& editor, const Vec3& at) {
         return with_new_element(text, text_path("lightning"), entries);
     };
     change_text(editor, added, "Lightning");
-}
-
-void keep_camera(Editor& editor) {
-    const auto place = [](const Vec3& v) {
-        return "[" + number_text(std::round(v.x), 7) + ", " + number_text(std::round(v.y), 7) + ", " +
-               number_text(std::round(v.z), 7) + "]";
-    };
-    const Camera& camera = editor.camera.camera;
-    const auto kept = [&](std::string text) {
-        text = with_value(text, text_path("camera.position_m"), place(camera.position_m));
-        text = with_value(text, text_path("camera.target_m"), place(camera.target_m));
-        if (editor.shown_scene && editor.shown_scene->render.camera.above_ground && !camera.above_ground)
-            text = with_value(text, text_path("camera.above_ground"), "false");
-        return with_value(text, text_path("camera.vertical_fov_deg"),
-                          number_text(camera.vertical_fov_deg, 4));
-    };
-    if (change_text(editor, kept, "Camera")) say(editor, "The scene has this camera now");
 }
 
 }  // namespace nephos

@@ -285,7 +285,10 @@ void view_options_panel(Editor& editor) {
     if (button(editor, "Look at the clouds", "F")) frame_scene(editor);
     ImGui::SameLine();
     if (button(editor, "That of the scene", "C")) take_scene_camera(editor);
-    if (button(editor, "Keep it in the scene", "Writes place and target into [camera]")) keep_camera(editor);
+    if (button(
+            editor, "Keep it in the scene",
+            "Writes place and target into [camera]; of a camera with a path, as its key frame at this time"))
+        keep_camera(editor);
     double fov = editor.camera.camera.vertical_fov_deg;
     const double low = 5, high = 120;
     ImGui::SetNextItemWidth(-1);
@@ -303,12 +306,13 @@ void view_options_panel(Editor& editor) {
         "anew.");
     if (editor.shown_scene && !editor.shown_scene->layers.empty()) {
         ImGui::SetNextItemWidth(-1);
-        ImGui::SliderFloat("##final state", &editor.final_state, 0, 1, "atmosphere to %.2f");
+        ImGui::SliderFloat("##final state", &editor.final_state, 0, 1, "atmosphere to %.2f",
+                           ImGuiSliderFlags_AlwaysClamp);
         editor.controls.note("final state");
         tooltip_of_last("State of the atmosphere that the climate goes to: 0 clear, 1 storm (T, 3.4)");
         ImGui::SetNextItemWidth(-1);
-        ImGui::SliderFloat("##duration", &editor.climate_minutes, 1, 120,
-                           "within %.0f min of simulated time");
+        ImGui::SliderFloat("##duration", &editor.climate_minutes, 1, 120, "within %.0f min of simulated time",
+                           ImGuiSliderFlags_AlwaysClamp);
         editor.controls.note("climate duration");
         if (button(editor, "Start the change now",
                    "Writes the change into [climate] as key frames from the present step on")) {

@@ -81,13 +81,20 @@ void add_element(Editor& editor, const Key& list, const TextPath& path) {
 void copy_element(Editor& editor, const TextPath& array, std::size_t index) {
     const auto copied = [&](const std::string& before) {
         std::string text = with_copied_element(before, array, index);
-        const Node* list = value_node(editor.document->values(), array);
-        const Entry* name = list != nullptr ? list->items.at(index).find("name") : nullptr;
-        if (name != nullptr && name->value.kind == Node::Kind::text) {
-            TextPath at = element_path(array, index + 1);
-            at.push_back({"name", 0});
-            text = with_value(text, at, toml_string(unused_name(name->value.text, names_of(list))));
-        }
+        const Node& values = editor.document->values();
+        const Node* list = value_node(values, array);
+        if (list == nullptr) return text;
+        const TextPath copy = element_path(array, index + 1);
+        const Entry* name = list->items.at(index).find("name");
+        if (name != nullptr && name->value.kind == Node::Kind::text)
+            text = with_value(
+                text, joined_path(copy, "name"),
+                toml_string(unused_name(name->value.text,
+                                        taken_names(values, array, editor.document->current_scene()))));
+        const Key* const tables = key_at(array);
+        if (tables == nullptr) return text;
+        if (const std::optional<TextEntry> place = place_of_copy(*tables, *list, index))
+            text = with_value(text, joined_path(copy, place->first), place->second);
         return text;
     };
     if (!change_text(editor, copied, "Copy " + path_text(element_path(array, index)))) return;

@@ -251,28 +251,38 @@ void section_rows(Editor& editor, const Section& section, const TextPath& path) 
     }
 }
 
-// All keys of the scene whose names match.
-void found_rows(Editor& editor, const Section& section, const TextPath& path) {
+// All keys of the scene whose names match. Returns whether there were any.
+bool found_rows(Editor& editor, const Section& section, const TextPath& path) {
+    constexpr std::size_t kMostShown = 50;  // of a list
     const std::string heading = path.empty() ? "Scene" : path_text(path);
     ImGui::PushID(heading.c_str());
     const float before = ImGui::GetCursorPosY();
-    if (plain_rows(editor, section, path, editor.filter) && ImGui::GetCursorPosY() > before) {
+    bool any = plain_rows(editor, section, path, editor.filter);
+    if (any && ImGui::GetCursorPosY() > before) {
         ImGui::TextDisabled("%s", ("\u2191 " + heading).c_str());
         ImGui::Separator();
     }
     ImGui::PopID();
     for (const Key& key : section.keys) {
-        if (key.kind == KeyKind::table) found_rows(editor, *key.section, joined_path(path, key.name));
+        if (key.kind == KeyKind::table) any |= found_rows(editor, *key.section, joined_path(path, key.name));
         if (key.kind != KeyKind::tables) continue;
         const TextPath at = joined_path(path, key.name);
-        for (std::size_t n = 0; n < 50; ++n) {
-            const Node* array = value_node(editor.document->values(), at);  // an edit replaces the values
-            if (array == nullptr || n >= array->items.size()) break;
+        const auto size = [&]() -> std::size_t {  // an edit replaces the values
+            const Node* array = value_node(editor.document->values(), at);
+            return array != nullptr ? array->items.size() : 0;
+        };
+        bool any_of_list = false;
+        for (std::size_t n = 0; n < std::min(size(), kMostShown); ++n) {
             TextPath element = at;
             element.push_back({{}, n});
-            found_rows(editor, *key.section, element);
+            any_of_list |= found_rows(editor, *key.section, element);
         }
+        any |= any_of_list;
+        if (!any_of_list || size() <= kMostShown) continue;
+        ImGui::TextDisabled("%s: %zu more, in the outline", path_text(at).c_str(), size() - kMostShown);
+        editor.controls.note("more of " + path_text(at));
     }
+    return any;
 }
 
 // Goes up to the list where what is selected is not there any more, as another program has taken it out.

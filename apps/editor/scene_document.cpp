@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/editor/scene_document.h"
 
+#include <algorithm>
 #include <chrono>
+#include <span>
 #include <system_error>
 #include <utility>
 
 #include "core/atomic_file.h"
+#include "core/digest.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
 
@@ -20,6 +24,16 @@ constexpr std::size_t kMostHistoryBytes = 256u << 20;
 std::optional<FileStamp> stamp_of(const fs::path& path) {
     const FileStamp stamp = file_stamp(path);
     return stamp == FileStamp{} ? std::nullopt : std::optional(stamp);
+}
+
+// The name of the edits of a scene that are kept in another folder: with the path of its own, or its checksum where that
+// is too long for a name.
+std::string name_elsewhere(const fs::path& folder, const std::string& name) {
+    constexpr std::size_t kLongest = 128;
+    std::string path = normal_path(fs::absolute(folder)).string();
+    if (path.size() > kLongest) path = "%" + digest_of(std::as_bytes(std::span(path)));
+    std::ranges::replace(path, '/', '%');
+    return path + "%" + name;
 }
 
 }  // namespace
@@ -146,6 +160,7 @@ void SceneDocument::save_as(const fs::path& path) {
     remove_autosave();
     path_ = path;
     has_file_ = true;
+    is_gone_ = false;
     saved_text_ = text();
     file_stamp_.reset();
     try {
@@ -171,12 +186,14 @@ bool SceneDocument::is_changed_on_disk() const {
 SceneDocument::Disk SceneDocument::look_at_disk() {
     if (!has_file_) return Disk::same;
     const std::optional<FileStamp> stamp = stamp_of(path_);
-    if (!stamp) return Disk::gone;
+    is_gone_ = !stamp;
+    if (is_gone_) return Disk::gone;
     if (stamp == file_stamp_) return Disk::same;
     FileText now;
     try {
         now = read_file(path_);
     } catch (const Error&) {
+        is_gone_ = true;
         return Disk::gone;
     }
     if (now.text == saved_text_) {
@@ -198,6 +215,7 @@ void SceneDocument::reload() {
 void SceneDocument::take_from_disk(FileText now) {
     saved_text_ = std::move(now.text);
     file_stamp_ = now.stamp;
+    is_gone_ = false;
     edit(saved_text_, "Change on disk");
 }
 
@@ -207,14 +225,39 @@ fs::path SceneDocument::autosave_folder(const fs::path& folder) const {
 }
 
 void SceneDocument::autosave(const fs::path& folder, const std::string& now) {
-    if (now == saved_text_) return remove_autosave();
+    if (now == saved_text_ && !is_gone_) return remove_autosave();
     if (now == autosaved_text_ && autosave_.is_in_place()) return;
-    autosave_.write(autosave_folder(folder), title(), now);
+    const fs::path beside = autosave_folder(folder);
+    try {
+        if (beside == folder) create_folders(folder);
+        autosave_.write(beside, title(), now);
+    } catch (const Error&) {
+        if (beside == folder) throw;
+        // One cannot write beside it, as beside a scene that is installed.
+        bool is_kept = false;
+        try {
+            create_folders(folder);
+            autosave_.write(folder, name_elsewhere(beside, title()), now);
+            is_kept = true;
+        } catch (const Error&) {  // the first one says more
+        }
+        if (!is_kept) throw;
+    }
     autosaved_text_ = now;
 }
 
 std::vector<LeftAutosave> SceneDocument::left_autosaves(const fs::path& folder) const {
-    std::vector<LeftAutosave> left = nephos::left_autosaves(autosave_folder(folder), title());
+    const fs::path beside = autosave_folder(folder);
+    std::vector<LeftAutosave> left = nephos::left_autosaves(beside, title());
+    if (beside != folder) {
+        const std::size_t before = name_elsewhere(beside, "").size();
+        for (LeftAutosave& one : nephos::left_autosaves(folder, name_elsewhere(beside, title()))) {
+            one.scene.erase(0, before);
+            std::error_code error;  // one that has a file is asked about with that
+            if (one.scene == title() || !fs::exists(beside / one.scene, error))
+                left.push_back(std::move(one));
+        }
+    }
     std::erase_if(left,
                   [this](const LeftAutosave& one) { return one.problem.empty() && one.text == text(); });
     return left;

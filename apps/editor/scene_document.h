@@ -64,7 +64,8 @@ class SceneDocument {
     // Rises with every change of the text, also by undo.
     std::uint64_t version() const { return version_; }
 
-    bool is_modified() const { return text() != saved_text_; }
+    // Returns whether there are edits that no file has: also of a file that is gone.
+    bool is_modified() const { return is_gone_ || text() != saved_text_; }
     bool has_file() const { return has_file_; }
     const std::filesystem::path& path() const { return path_; }
     // The folder that names of files in the text are relative to; empty: the present one.
@@ -114,7 +115,7 @@ class SceneDocument {
     std::size_t at_ = 0, history_bytes_ = 0;
     std::string merge_, saved_text_;
     std::filesystem::path path_;
-    bool has_file_ = false;
+    bool has_file_ = false, is_gone_ = false;  // gone: when it was looked at
     std::filesystem::path folder_;         // of one without a file
     std::optional<FileStamp> file_stamp_;  // of the version that saved_text_ is
     AutosaveFile autosave_;

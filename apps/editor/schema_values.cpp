@@ -186,11 +186,49 @@ std::vector<std::string> names_of(const Node* array) {
     return names;
 }
 
+std::vector<std::string> taken_names(const Node& values, const TextPath& array, const Scene* scene) {
+    std::vector<std::string> names = names_of(value_node(values, array));
+    if (scene == nullptr || array != text_path("model")) return names;
+    for (const BaseModel& model : scene->models)
+        if (std::ranges::find(names, model.name) == names.end()) names.push_back(model.name);
+    return names;
+}
+
 std::string unused_name(std::string_view start, const std::vector<std::string>& taken) {
     for (std::size_t number = taken.size() + 1;; ++number) {
         std::string name = std::string(start) + "-" + std::to_string(number);
         if (std::ranges::find(taken, name) == taken.end()) return name;
     }
+}
+
+namespace {
+
+double number_under(const Node& element, const std::string& key) {
+    const Entry* const entry = element.find(key);
+    if (entry == nullptr) return 0;
+    return entry->value.kind == Node::Kind::integer ? double(entry->value.integer) : entry->value.number;
+}
+
+// How far a new element stands behind the last one.
+double step_of(const Key& key) {
+    if (key.name == "state") return 0.25;
+    return key.name == "height_m" ? 500 : 600;
+}
+
+}  // namespace
+
+std::optional<TextEntry> place_of_copy(const Key& tables, const Node& array, std::size_t index) {
+    for (const Key& key : tables.section->keys) {
+        const bool rises = key.name == "time_s" ? tables.name != "lightning"
+                                                : tables.name == "levels" && key.name == "height_m";
+        if (!rises) continue;
+        const double here = number_under(array.items.at(index), key.name);
+        const double next = index + 1 < array.items.size()
+                                ? number_under(array.items[index + 1], key.name)
+                                : std::min(here + 2 * step_of(key), key.limits.max);
+        return TextEntry{key.name, number_text(here + 0.5 * (next - here), 9)};
+    }
+    return std::nullopt;
 }
 
 std::vector<TextEntry> new_element(const Key& tables, const Node& values, const TextPath& path,
@@ -206,7 +244,7 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
         if (key.name == "name") {
             std::string start = element_name(tables.name);
             start[0] = char(std::tolower(static_cast<unsigned char>(start[0])));
-            value = toml_string(unused_name(start, names_of(array)));
+            value = toml_string(unused_name(start, taken_names(values, path, scene)));
         } else if (layer_skies && scene != nullptr && !scene->skies.empty()) {
             value = "[" + toml_string(scene->skies.front().name) + "]";
         } else if (sky_models && key.name == "models" && scene != nullptr && !scene->models.empty()) {
@@ -230,15 +268,8 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
             value += value.size() > 3 ? " }]" : "}]";
         } else if (key.kind == KeyKind::number && rises_from_item_to_item(tables, key) && array != nullptr) {
             double last = 0;
-            for (const Node& item : array->items) {
-                const Entry* entry = item.find(key.name);
-                if (entry == nullptr) continue;
-                const Node& number = entry->value;
-                last = std::max(last,
-                                number.kind == Node::Kind::integer ? double(number.integer) : number.number);
-            }
-            const double step = key.name == "state" ? 0.25 : key.name == "height_m" ? 500 : 600;
-            value = number_text(array->items.empty() ? 0 : std::min(last + step, key.limits.max), 6);
+            for (const Node& item : array->items) last = std::max(last, number_under(item, key.name));
+            value = number_text(array->items.empty() ? 0 : std::min(last + step_of(key), key.limits.max), 6);
         } else if (key.name == "position_m" && tables.section->find("target_m") != nullptr) {
             value = default_of_kind(key, {centre_m.x, centre_m.y - 4000, std::max(2.0, centre_m.z - 500)});
         } else {

@@ -47,10 +47,18 @@ Node parsed_value(const std::string& toml);
 std::vector<TextEntry> new_element(const Key& tables, const Node& values, const TextPath& path,
                                    const Scene* scene, const Vec3& centre_m);
 
+// Returns where a copy of an element stands that is put behind it, in an array whose elements rise in time or height: in the
+// middle to the next. Nothing for other arrays.
+std::optional<TextEntry> place_of_copy(const Key& tables, const Node& array, std::size_t index);
+
 // Returns a name that no element has: "cloud 2".
 std::string unused_name(std::string_view start, const std::vector<std::string>& taken);
 // Returns the texts under `name` of all elements of an array.
 std::vector<std::string> names_of(const Node* array);
+
+// Returns the names that a new element of an array may not have: those of its elements, and of models those that the scene has
+// from files; `scene`: null while the text has problems.
+std::vector<std::string> taken_names(const Node& values, const TextPath& array, const Scene* scene);
 
 // Gives an element another name, and changes what refers to it: skies, rain areas and metamorphoses to models, layers to
 // skies. `elsewhere`: names of models that the scene has from files. Throws Error(usage) where the name is empty, or another element

@@ -40,6 +40,7 @@ const std::map<std::string, int>& commands() {  // and how many words follow at 
                                                   {"hashes", 1},
                                                   {"expect-control", 1},
                                                   {"resize", 2},
+                                                  {"drop", 1},
                                                   {"minimise", 0},
                                                   {"restore", 0},
                                                   {"random", 2},
@@ -316,6 +317,8 @@ void Script::begin_line(Editor& editor) {
         if (!find(editor, rest_of(words, 1), at)) return;
     } else if (command == "resize") {
         editor.window->set_size(int(number(1, 1, kMostPixels)), int(number(2, 1, kMostPixels)));
+    } else if (command == "drop") {
+        editor.window->drop({words.begin() + 1, words.end()});
     } else if (command == "minimise" || command == "restore") {
         editor.window->minimise(command == "minimise");
     } else if (command == "random") {

@@ -19,6 +19,7 @@
 //     hashes FILE            saves the state hashes of the steps that were simulated, as `nephos hash` prints them
 //     expect-control NAME    fails unless the control is there
 //     resize X Y, minimise, restore
+//     drop FILE ...          files that are dropped on the window; a name with blanks stands in quotes
 //     random N SEED          N random clicks, drags and keys
 //     quit                   ends at once, whatever is unsaved
 //

@@ -317,6 +317,8 @@ void tooltip(const char* text);
 // view.cpp
 void frame_scene(Editor& editor);        // a camera that shows all of the clouds
 void take_scene_camera(Editor& editor);  // that of the scene
+// Writes the camera of the window into the scene: of a camera that goes along a path, as its key frame at the time that is shown.
+void keep_camera(Editor& editor);
 std::optional<ImVec2> on_screen(const Editor& editor, const Vec3& world_m);
 Camera camera_of_view(const Editor& editor);  // with the size of the picture in the window
 
@@ -397,7 +399,6 @@ Sun sun_now(const Editor& editor);  // at the step that is shown
 // From the present step on the climate goes to a state, 0..1, within a time.
 void record_climate(Editor& editor, double final_state, double duration_s);
 void add_flash(Editor& editor, const Vec3& at_m);  // lightning at the step that is shown
-void keep_camera(Editor& editor);                  // writes it into the scene
 
 // theme.cpp
 void apply_theme(Editor& editor);

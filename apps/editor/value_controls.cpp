@@ -79,15 +79,6 @@ bool is_slider(const Key& key) {
     return std::isfinite(range) && range <= 400 && range > 0 && key.unit != "per step";
 }
 
-double within_limits(const Limits& limits, double number) {
-    if (std::isnan(number)) number = 0;
-    if (limits.infinite && std::isinf(number)) return number;
-    const double room = std::min(1e-3, std::isfinite(limits.max) ? 1e-3 * (limits.max - limits.min) : 1e-3);
-    if (limits.above_min && number <= limits.min) return limits.min + room;
-    if (limits.below_max && number >= limits.max) return limits.max - room;
-    return std::clamp(number, limits.min, limits.max);
-}
-
 // To a power of ten that is at most `step`.
 double rounded(double number, double step) {
     if (!std::isfinite(number) || !(step > 0)) return number;
@@ -358,6 +349,15 @@ std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row, bool&
 }
 
 }  // namespace
+
+double within_limits(const Limits& limits, double number) {
+    if (std::isnan(number)) number = 0;
+    if (limits.infinite && std::isinf(number)) return number;
+    const double room = std::min(1e-3, std::isfinite(limits.max) ? 1e-3 * (limits.max - limits.min) : 1e-3);
+    if (limits.above_min && number <= limits.min) return limits.min + room;
+    if (limits.below_max && number >= limits.max) return limits.max - room;
+    return std::clamp(number, limits.min, limits.max);
+}
 
 std::optional<std::string> edit_value(Editor& editor, const ValueRow& row, bool& unfinished) {
     switch (row.key.kind) {

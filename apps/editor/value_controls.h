@@ -21,6 +21,9 @@ struct ValueRow {
     bool present;      // in the text
 };
 
+// Returns the nearest number that a key allows; of one that must be above or below its limit, a thousandth from that.
+double within_limits(const Limits& limits, double number);
+
 // Draws the control; returns the new value as TOML when the user changed it, or is about to: `unfinished` says that it is a text
 // whose field has the caret yet.
 std::optional<std::string> edit_value(Editor& editor, const ValueRow& row, bool& unfinished);

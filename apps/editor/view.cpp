@@ -5,7 +5,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "apps/editor/key_frame_text.h"
 #include "apps/editor/state.h"
+#include "core/text.h"
 #include "density/metaballs.h"
 #include "render/options/camera.h"
 #include "simulation/framing.h"
@@ -152,6 +154,32 @@ void captions(Editor& editor, const LiveStatus& status) {
     }
 }
 
+// A place as a scene has it, to the centimetre.
+std::string place_toml(const Vec3& place_m) {
+    const auto part = [](double metres) { return number_text(std::round(100 * metres) / 100, 10); };
+    return "[" + part(place_m.x) + ", " + part(place_m.y) + ", " + part(place_m.z) + "]";
+}
+
+std::vector<KeyFrame> key_frames(const std::vector<CameraKey>& keys) {
+    std::vector<KeyFrame> out;
+    for (const CameraKey& key : keys)
+        out.push_back({key.time_s,
+                       {{"position_m", place_toml(key.position_m)}, {"target_m", place_toml(key.target_m)}}});
+    return out;
+}
+
+// The path of a camera with a key frame at a time.
+std::vector<CameraKey> camera_with_key(std::vector<CameraKey> path, const Camera& camera, double time_s) {
+    const auto at = std::ranges::lower_bound(path, time_s, {}, &CameraKey::time_s);
+    const CameraKey key{time_s, camera.position_m, camera.target_m};
+    if (at != path.end() && at->time_s == time_s) {
+        *at = key;
+    } else {
+        path.insert(at, key);
+    }
+    return path;
+}
+
 }  // namespace
 
 Camera camera_of_view(const Editor& editor) {
@@ -174,6 +202,36 @@ void take_scene_camera(Editor& editor) {
     editor.camera.camera = camera_at(editor.shown_scene->render.camera, time_s);
     editor.camera.camera.path.clear();
     editor.camera.moved = false;
+}
+
+void keep_camera(Editor& editor) {
+    const Scene* const scene = editor.document->current_scene();
+    const Camera& camera = editor.camera.camera;
+    const Camera before = scene != nullptr ? scene->render.camera : Camera{};
+    const double time_s = editor.picture ? editor.picture->time_s : 0;
+    if (!before.path.empty() && before.above_ground)
+        return say(editor,
+                   "The camera is not kept: that of the scene follows the ground along a path, whose key "
+                   "frames are set in [camera]",
+                   true);
+    const auto kept = [&](std::string text) {
+        if (!before.path.empty()) {
+            text = with_key_frames(text, text_path("camera.path"), key_frames(before.path),
+                                   key_frames(camera_with_key(before.path, camera, time_s)));
+        } else {
+            text = with_value(text, text_path("camera.position_m"), place_toml(camera.position_m));
+            text = with_value(text, text_path("camera.target_m"), place_toml(camera.target_m));
+        }
+        if (before.above_ground && !camera.above_ground)
+            text = with_value(text, text_path("camera.above_ground"), "false");
+        if (camera.vertical_fov_deg == before.vertical_fov_deg) return text;
+        return with_value(text, text_path("camera.vertical_fov_deg"),
+                          number_text(std::round(100 * camera.vertical_fov_deg) / 100, 5));
+    };
+    if (!change_text(editor, kept, "Camera")) return;
+    say(editor, before.path.empty()
+                    ? "The scene has this camera now"
+                    : "The path of the scene's camera is here at " + number_text(time_s, 6) + " s now");
 }
 
 void frame_scene(Editor& editor) {

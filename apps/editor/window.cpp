@@ -371,6 +371,9 @@ bool Window::is_minimised() const {
 }
 float Window::content_scale() const { return impl_->handle.scale; }
 std::string Window::device_name() const { return impl_->gpu.name; }
+void Window::drop(const std::vector<std::filesystem::path>& files) {
+    impl_->dropped.insert(impl_->dropped.end(), files.begin(), files.end());
+}
 std::vector<std::filesystem::path> Window::take_dropped() { return std::exchange(impl_->dropped, {}); }
 std::vector<std::string> Window::validation_messages() const { return impl_->gpu.messages(); }
 void Window::wake() { glfwPostEmptyEvent(); }

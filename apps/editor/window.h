@@ -78,6 +78,8 @@ class Window {
     std::string device_name() const;
     // Files that were dropped on the window since the last call.
     std::vector<std::filesystem::path> take_dropped();
+    // As if the user had dropped these.
+    void drop(const std::vector<std::filesystem::path>& files);
     // What the validation layer said so far.
     std::vector<std::string> validation_messages() const;
     // Wakes a begin_frame() that waits; any thread may call it.

@@ -323,6 +323,71 @@ TEST(SceneDocument, TwoEditorsKeepTheirOwnEdits) {
     EXPECT_TRUE(SceneDocument(std::string("seed = 5\n")).left_autosaves(folder.path).empty());
 }
 
+// Beside an installed scene one cannot write: its edits, and those of its copies, are kept in the folder of settings, under
+// names that tell them from those of scenes called alike.
+TEST(SceneDocument, EditsOfASceneWhoseFolderCannotBeWrittenAreKeptElsewhere) {
+    const Folder folder;
+    const std::filesystem::path settings = folder.path / "settings", one = folder.path / "one",
+                                two = folder.path / "two";
+    for (const std::filesystem::path& scenes : {one, two}) {
+        std::filesystem::create_directory(scenes);
+        write(scenes / "a.toml", "seed = 1\n");
+        // A folder in the way of each name, as root may write everywhere.
+        for (const std::string name : {"a.toml", "a-2.toml"})
+            for (int n = 0; n < 1000; ++n) {
+                const std::string middle =
+                    n == 0 ? "" : "." + std::to_string(::getpid()) + (n > 1 ? "-" + std::to_string(n) : "");
+                std::filesystem::create_directory(scenes / ("." + name + middle + ".autosave"));
+            }
+    }
+    {
+        SceneDocument document(one / "a.toml"), copy("seed = 1\n", "a-2.toml", one);
+        document.edit("seed = 7\n", "edit");
+        copy.edit("seed = 8\n", "edit");
+        document.autosave(settings);
+        copy.autosave(settings);
+    }
+    SceneDocument next(one / "a.toml");
+    auto left = next.left_autosaves(settings);
+    ASSERT_EQ(left.size(), 2u);
+    std::ranges::sort(left, {}, &LeftAutosave::scene);
+    EXPECT_EQ(left[0].scene, "a-2.toml");
+    EXPECT_EQ(left[1].scene, "a.toml");
+    next.take_autosave(left[1]);
+    EXPECT_EQ(next.text(), "seed = 7\n");
+    next.save();
+    EXPECT_EQ(next.left_autosaves(settings).size(), 1u);
+    EXPECT_TRUE(SceneDocument(two / "a.toml").left_autosaves(settings).empty());
+}
+
+// The text of a file that is gone is nowhere else.
+TEST(SceneDocument, AFileThatIsGoneIsUnsaved) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    SceneDocument document(path);
+    EXPECT_FALSE(document.is_modified());
+    std::filesystem::remove(path);
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::gone);
+    EXPECT_TRUE(document.is_modified());
+    document.autosave(folder.path);
+    EXPECT_EQ(content(folder.path / ".a.toml.autosave"), "seed = 1\n");
+    write(path, "seed = 1\n");
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::same);
+    EXPECT_FALSE(document.is_modified());
+    document.autosave(folder.path);
+    EXPECT_FALSE(std::filesystem::exists(folder.path / ".a.toml.autosave"));
+    std::filesystem::remove(path);
+    document.look_at_disk();
+    write(path, "seed = 2\n");
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::reloaded);
+    std::filesystem::remove(path);
+    document.look_at_disk();
+    document.save();
+    EXPECT_FALSE(document.is_modified());
+    EXPECT_EQ(content(path), "seed = 2\n");
+}
+
 // A copy of a scene that was never saved leaves its edits beside the scene, which offers them; not those of a scene that
 // is a file itself, or whose name only begins alike.
 TEST(SceneDocument, EditsOfACopyAreOfferedWithTheScene) {

@@ -1,0 +1,89 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""What is opened in the place of another scene, or dropped on the window, and a file that is gone. See case.py."""
+
+import subprocess
+import sys
+import tomllib
+import unittest
+
+from case import NEPHOS, Case
+from kept import MODELS, WIND
+
+STATE = 'seed = 4\n[lattice]\ncells = [16, 16, 12]\n'
+
+
+class Opening(Case):
+    def two(self, first, second):
+        """A folder of two scenes; the first is opened with it."""
+        for name, text in (("a.toml", first), ("b.toml", second)):
+            (self.folder / name).write_text(text, encoding="utf-8")
+        return self.folder / "b.toml"
+
+    OPEN_B = 'click "menu File"\nclick "menu Scenes of the folder"\nclick "menu b.toml"\nwait 1\nexpect-control "simulation 1"\n'
+
+    def test_nothing_of_the_scene_before_is_left(self):
+        """Clouds of its models, layers that are hidden, and recording, which would write key frames into the next one."""
+        seed = "{ size_m = [400, 400, 200], position_m = [0, 0, 0] }"
+        other = MODELS[:MODELS.index("seeds = [")] + f"seeds = [{seed}]\n" + MODELS[MODELS.index("[[sky]]"):]
+        first = other.replace(seed, f"{seed}, {seed.replace('[0, 0, 0]', '[900, 0, 0]')}, {seed.replace('[0, 0, 0]', '[1800, 0, 0]')}")
+        scene = self.two(first, other)
+        sketched = 'click model\nclick model[0]\nclick "20 at once"\nwait 0.5\n'
+        self.edit(self.folder, script=f'wait-step 1\nkey SPACE\n{sketched}click "cloud 2"\nwait 0.3\n{self.OPEN_B}{sketched}'
+                                      'click "cloud 3"\nclick "Make it a base model"\nwait 0.5\nkey CTRL+S\nwait 0.5\n')
+        made = tomllib.loads(scene.read_text(encoding="utf-8"))["model"][1]
+        self.assertEqual([seed["position_m"] for seed in made["seeds"]], [[0, 0, 0]])
+        wind = WIND.replace("7.5", "8")
+        scene = self.two(WIND, wind)
+        self.edit(self.folder, script='wait-step 1\nkey SPACE\nclick "tab View"\nclick "Record as key frames"\n' + self.OPEN_B +
+                                      "key SPACE\nclick wind\nclick wind[0]\nclick wind[0].levels\nclick wind[0].levels[0]\nwait 0.3\n"
+                                      'click "tab Properties"\nset wind[0].levels[0].speed_m_per_s 9\nwait 0.5\nkey CTRL+S\nwait 0.5\n')
+        self.assertEqual(scene.read_text(encoding="utf-8"), wind.replace("= 8 ", "= 9 "))
+
+    def test_a_name_with_quotes_is_kept(self):
+        """Of a model that a cloud becomes."""
+        scene = self.folder / "q.toml"
+        scene.write_text(MODELS.replace('"bank"', "'big \"bank\"'"), encoding="utf-8")
+        self.edit(scene, script='wait-step 1\nkey SPACE\nclick model\nclick model[0]\nclick "20 at once"\nwait 0.5\nclick "cloud 3"\n'
+                                'click "Make it a base model"\nwait 0.5\nkey CTRL+S\nwait 0.5\n')
+        names = [model["name"] for model in tomllib.loads(scene.read_text(encoding="utf-8"))["model"]]
+        self.assertEqual(names, ['big "bank"', 'big "bank"-2'])
+
+    def test_what_is_dropped_waits_for_an_answer(self):
+        """A grid is asked about in the scene that it was dropped on; a scene is not opened under a dialog."""
+        scene = self.two(STATE, STATE.replace("4", "5"))
+        subprocess.run([NEPHOS, "state", scene, "--steps", "1", "--out", self.folder / "grid.vdb"], check=True, capture_output=True)
+        self.edit(self.folder / "a.toml", script="wait-step 1\ndrop grid.vdb b.toml\nwait 0.5\nexpect-control refusal\n"
+                                                 'click "Start from it"\nwait 0.5\nkey CTRL+S\nwait 0.5\n')
+        self.assertEqual(tomllib.loads((self.folder / "a.toml").read_text(encoding="utf-8"))["lattice"]["initial_state"], "grid.vdb")
+        self.assertEqual(scene.read_text(encoding="utf-8"), STATE.replace("4", "5"))
+        self.edit(self.folder / "a.toml", script='wait-step 1\nkey CTRL+SHIFT+S\nwait 0.3\ndrop b.toml\nwait 0.5\nclick Cancel\n'
+                                                 'wait 0.5\ndrop b.toml\nwait 1\nclick scene\nclick "tab Properties"\nset seed 77\nwait 0.3\nkey CTRL+S\nwait 0.5\n')
+        self.assertIn("seed = 77", scene.read_text(encoding="utf-8"))
+
+    def test_a_grid_is_no_reason_to_save(self):
+        """It is asked about at once, whatever is edited."""
+        scene = self.two(STATE, STATE)
+        subprocess.run([NEPHOS, "state", scene, "--steps", "1", "--out", self.folder / "grid.vdb"], check=True, capture_output=True)
+        self.edit(scene, script='wait-step 1\nclick scene\nclick "tab Properties"\nset seed 7\nwait 0.3\ndrop grid.vdb\nwait 0.5\n'
+                                'click "Start from it"\nwait 0.5\nkey CTRL+S\nwait 0.5\n')
+        self.assertIn("seed = 7", scene.read_text(encoding="utf-8"))
+        self.assertIn("grid.vdb", scene.read_text(encoding="utf-8"))
+
+    def test_a_file_that_is_gone_is_unsaved(self):
+        """Its text is nowhere else: the editor asks before it ends, and saving makes the file anew."""
+        scene = self.two(STATE, STATE)
+        ready = self.folder / "ready.txt"
+        editor = subprocess.Popen(self.command(scene, script='wait-step 1\nhashes ready.txt\nwait 2\nkey CTRL+Q\nwait 0.5\n'
+                                                             'expect-control "unsaved b.toml"\nclick "Save them"\nwait 0.5\n'),
+                                  cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+        while not ready.exists():
+            self.assertIsNone(editor.poll(), "it ended")
+        scene.unlink()
+        errors = editor.communicate(timeout=120)[1]
+        self.assertEqual(editor.returncode, 0, errors)
+        self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[1:]], verbosity=2)
