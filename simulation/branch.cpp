@@ -78,11 +78,20 @@ std::string branch_hash(const std::string& scene, const BranchPoint& point) {
 // Copies the header and the rows of all steps before `steps`.
 void copy_statistics(const std::filesystem::path& from, const std::filesystem::path& to, std::uint64_t steps,
                      std::string_view header) {
-    std::string rows(header);
-    read_statistics(
-        from, steps, [&](std::uint64_t, std::string_view row, const StateHash&) { (rows += row) += '\n'; },
-        header);
-    write_atomically(to, rows);
+    write_pieces_atomically(to, [&](const AppendPiece& append) {
+        constexpr std::size_t kPiece = 1u << 20;  // a table may be larger than memory
+        std::string rows(header);
+        read_statistics(
+            from, steps,
+            [&](std::uint64_t, std::string_view row, const StateHash&) {
+                (rows += row) += '\n';
+                if (rows.size() < kPiece) return;
+                append(rows);
+                rows.clear();
+            },
+            header);
+        append(rows);
+    });
 }
 
 // Frames are counted on from those of the other run. Throws Error(usage) where the scene's numbers and times put a frame that

@@ -278,8 +278,16 @@ std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
     const Descriptor held = identity_of_folder(folder);
     const std::function<void()> check = [&] { require_in_place(held, folder, "its tables were written"); };
     const PublishCheck keeps_in_place(check);
-    // First, for damaged series alone can end it: the tables before it then stay as they are.
-    if (!write_series_table(plan, records, folder / "series.nc")) remove_table(folder / "series.nc");
+    // First, for damaged series alone can end it: the tables before it then stay as they are. Series that are more than a file
+    // of NetCDF holds leave the others.
+    std::optional<Error> too_many;
+    try {
+        if (!write_series_table(plan, records, folder / "series.nc")) remove_table(folder / "series.nc");
+    } catch (const Error& error) {
+        if (error.code() != ErrorCode::usage) throw;
+        too_many = Error(error.code(), error.what() + std::string("; the other tables are written"));
+        remove_table(folder / "series.nc");
+    }
     write_runs(plan, records, folder / "runs.csv");
     write_points(plan, records, folder / "points.csv");
     const std::uint64_t missing = write_failures(plan, records, folder / "failures.csv");
@@ -288,6 +296,7 @@ std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
     else
         remove_table(folder / "tracks.csv");  // of another plan
     write_manifest(plan, records, folder / "manifest.json");
+    if (too_many) throw *too_many;
     return missing;
 }
 

@@ -29,7 +29,7 @@ exec "${{NEPHOS:-nephos}}" sweep sweep.toml --shard "$SLURM_ARRAY_TASK_ID/{0}" \
 )";
 
 // The records of a part are no output of its rule: Snakemake removes outputs before it runs a rule again, and they go on. What
-// is done is of a number of parts: with another one, part 0 has other runs.
+// is done is of a number of parts: with another one, part 0 has other runs. Status 1 says that runs failed, which are in the tables.
 constexpr std::string_view kSnakemake =
     R"(# Runs a sweep in {0} parts and makes its tables: snakemake --cores N, in this folder.
 # NEPHOS names the program where it is not in the path.
@@ -46,7 +46,7 @@ rule shard:
     input: "sweep.toml", "scene.toml"
     output: touch("shards/{{shard}}-of-{0}.done")
     threads: 1
-    shell: "{{NEPHOS:q}} sweep sweep.toml --shard {{wildcards.shard}}/{0} --workers {{threads}} --out . --quiet"
+    shell: "{{NEPHOS:q}} sweep sweep.toml --shard {{wildcards.shard}}/{0} --workers {{threads}} --out . --quiet || [ $? -eq 1 ]"
 )";
 
 constexpr std::string_view kProgram = "\"${NEPHOS:-nephos}\"";

@@ -230,10 +230,11 @@ int sweep(const SweepArguments& a) {
     if (a.emit && a.shards > 1)
         throw Error(ErrorCode::usage,
                     "--emit writes all shards: leave out --shard, and give their number as --tasks");
-    if (a.emit && (a.retry_failed || a.fail_fast || a.workers > 0 || a.work.json))
-        throw Error(ErrorCode::usage,
-                    "--emit runs nothing: leave out --retry-failed, --fail-fast, --workers and --json, and "
-                    "write those that are wanted into the script");
+    if (a.emit && (a.retry_failed || a.fail_fast || a.overwrite || a.workers > 0 || a.work.json))
+        throw Error(
+            ErrorCode::usage,
+            "--emit runs nothing: leave out --retry-failed, --fail-fast, --overwrite, --workers and --json, "
+            "and write those that are wanted into the script");
     if (a.emit) {
         const std::string next = emit_sweep(plan, *a.emit, a.tasks, job.folder);
         if (!a.work.quiet) print_note(describe(plan));

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <numeric>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -49,10 +50,14 @@ void require_name(const std::filesystem::path& file, const std::string& name) {
 
 std::vector<WindTable> wind_of(const Scene& scene, std::optional<std::size_t> layer,
                                const ExportSequence& s) {
-    std::vector<double> times;
-    const Wind& wind = layer ? layer_wind(scene, *layer) : scene.automaton.wind;
-    for (const WindKeyframe& keyframe : wind.keyframes) times.push_back(keyframe.time_s);
-    if (times.empty()) times.push_back(0);
+    std::set<double> times;  // between two of them each wind is linear
+    const auto add = [&](const Wind& wind) {
+        for (const WindKeyframe& keyframe : wind.keyframes) times.insert(keyframe.time_s);
+    };
+    if (!layer) add(scene.automaton.wind);
+    for (std::size_t n = 0; n < scene.layers.size(); ++n)
+        if (!layer || n == *layer) add(layer_wind(scene, n));
+    if (times.empty()) times.insert(0);
     std::vector<WindTable> tables;
     for (const double time_s : times) {
         WindTable table{time_s, wind_levels(scene, layer, s.placement, s.extent, time_s)};

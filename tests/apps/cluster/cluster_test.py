@@ -55,6 +55,17 @@ class Engines(Emitted):
                                capture_output=True, text=True)
         self.assertIn("Nothing to be done", again.stdout + again.stderr)
 
+    def test_snakemake_where_runs_fail(self):
+        """Values that contradict each other: the runs that have failed are in the tables, which are made all the same."""
+        self.write("two.toml", "".join(f"[[wind]]\ntime_s = {time}\nlevels = [{{ height_m = 0, from_deg = 270, speed_m_per_s = 1 }}]\n" for time in (0, 1000))
+                   + "[lattice]\ncells = [8, 8, 4]\n")
+        self.call("sweep", "two.toml", "--axis", "wind[0].time_s=0,700", "--axis", "wind[1].time_s=600,800", "--replicates", 1, "--steps", "20",
+                  "--out", "emitted", "--emit", "snakemake", "--tasks", "2")
+        self.command("snakemake", "--cores", "2")
+        failures = (self.folder / "emitted/failures.csv").read_text(encoding="utf-8")
+        self.assertEqual(failures.count("not after the profile before it"), 1, failures)
+        self.assertTrue((self.folder / "emitted/points.csv").exists())
+
     def test_snakemake_with_another_number_of_parts(self):
         """What is done of one number of parts says nothing of another one, also where times of files alone decide."""
         self.sweep("emitted", "--emit", "snakemake", "--tasks", "3")

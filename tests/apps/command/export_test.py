@@ -173,6 +173,21 @@ class Export(Case):
         self.call("export", *sorted((self.folder / "run/density").glob("*.vdb")), "--to", "raw", "-o", "calm")
         self.assertEqual(json.loads(next((self.folder / "calm").glob("*.volume.json")).read_text())["wind"], [])
 
+    def test_the_wind_of_all_layers_has_their_key_frames(self):
+        """Of those of layers, which may be all that there are, as of those of the scene."""
+        frames = lambda table, times: "".join(f"[[{table}]]\ntime_s = {time}\nlevels = [{{ height_m = 0, from_deg = {turn}, speed_m_per_s = {speed} }}]\n"
+                                              for time, turn, speed in times)
+        layer = ('[[model]]\nname = "m"\nseeds = [{ size_m = [300, 300, 200] }]\n[[sky]]\nname = "s"\nstate = 0\nmodels = "m"\nclouds = 3\n'
+                 '[[layer]]\nname = "low"\nskies = "s"\nbase_height_m = 200\n') + frames("layer.wind", ((0, 270, 5), (1000, 180, 9)))
+        for name, more, times in (("own", layer, [0, 1000]), ("both", frames("wind", ((0, 90, 1), (600, 90, 3))) + layer, [0, 600, 1000])):
+            self.call("run", self.write(f"{name}.toml", SCENE + more), "--no-render", "--out", name)
+            self.call("export", name, "--to", "raw", "-o", f"{name}-raw")
+            sidecar = json.loads(next((self.folder / f"{name}-raw").glob("*.volume.json")).read_text())
+            self.assertEqual([wind["time_s"] for wind in sidecar["wind"]], times)
+            last = sidecar["wind"][-1]["levels"][0]
+            self.assertAlmostEqual(last["north_m_per_s"], 9, 5)
+            self.assertAlmostEqual(last["east_m_per_s"], 0, 5)
+
     def test_velocity_has_the_fields_of_the_wind(self):
         """Those of the run's own grid, also where there is no profile; those of files are told."""
         import pyopenvdb

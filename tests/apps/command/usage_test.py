@@ -172,6 +172,21 @@ class Terminal(Case):
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         self.assertRegex(result.stdout, r"^0 [0-9a-f]{32}\n$")
 
+    def test_a_reader_that_goes_away_hides_no_error(self):
+        """What a run or a check came to is its status all the same."""
+        self.call("run", self.scene, "--no-render", "--out", "checked")
+        frame = next((self.folder / "checked/density").glob("*.vdb"))
+        damaged = bytearray(frame.read_bytes())
+        damaged[-40] ^= 1
+        frame.write_bytes(damaged)
+        for arguments in (["verify", "checked"], ["verify", "checked", "--json"]):
+            read, write = os.pipe()
+            os.close(read)
+            result = subprocess.run([NEPHOS, *arguments], stdout=write, stderr=subprocess.PIPE, text=True, timeout=60, cwd=self.folder)
+            os.close(write)
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn("is not what it claims to be", result.stderr)
+
     def test_a_full_stdout_is_an_error(self):
         with open("/dev/full", "w") as full:
             for arguments in (["hash", self.scene], ["--help"], ["completion", "bash"]):
