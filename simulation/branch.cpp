@@ -30,7 +30,8 @@ std::filesystem::path checkpoint_of(const std::filesystem::path& from) {
     if (!is_there(from)) refuse("no such run");
     if (!std::filesystem::is_directory(from, error)) {
         if (!is_checkpoint(from)) refuse("is no checkpoint of a run");
-        return from;
+        const bool is_link = std::filesystem::is_symlink(std::filesystem::symlink_status(from, error));
+        return is_link ? std::filesystem::canonical(from) : from;  // what belongs to it lies beside it
     }
     const std::filesystem::path checkpoint = from / "checkpoint.nephos";
     if (!is_there(checkpoint)) refuse("holds no checkpoint of a run");
@@ -209,16 +210,19 @@ void refuse_to_remove_other_run(const RunSettings& settings,
 
 void require_tables_of_other_run(const RunSettings& settings, std::uint64_t steps) {
     const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
-    if (is_there(parent.manifest())) {
-        const EarlierRun run = read_manifest(parent.manifest());
-        if (run.simulation_hash != settings.branch->simulation_hash)
-            throw Error(
-                ErrorCode::io,
-                fmt::format("{}: is not of the run in the folder that it lies in, whose statistics the "
-                            "branch begins with",
-                            settings.branch->checkpoint.string()));
-        require_tables_of_run(parent, run);
-    }
+    if (!is_there(parent.manifest()))
+        throw Error(
+            ErrorCode::io,
+            fmt::format("{}: has no manifest.json beside it, which says whose the statistics are that the "
+                        "branch begins with: give the folder of the run, or copy that as a whole",
+                        settings.branch->checkpoint.string()));
+    const EarlierRun run = read_manifest(parent.manifest());
+    if (run.simulation_hash != settings.branch->simulation_hash)
+        throw Error(ErrorCode::io,
+                    fmt::format("{}: is not of the run in the folder that it lies in, whose statistics the "
+                                "branch begins with",
+                                settings.branch->checkpoint.string()));
+    require_tables_of_run(parent, run);
     read_statistics(parent.statistics(), steps, {}, kStatisticsHeader);
     for (const LayerOptions& layer : settings.scene.layers)
         read_statistics(parent.statistics(layer.name), steps, {}, kLayerStatisticsHeader);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <system_error>
@@ -88,24 +89,25 @@ void report_progress(const RunObserver& observer, const Simulation& simulation, 
 
 // Up to the end or until it is stopped; leaves a checkpoint, at the end only where one is wanted.
 void simulate(Simulation& simulation, RunRecorder& recorder, const RunSettings& settings,
-              const RunObserver& observer, const FolderLock& lock, Clock::time_point begin) {
+              const RunObserver& observer, const std::function<void()>& require_in_place,
+              Clock::time_point begin) {
     Clock::time_point saved = Clock::now(), looked = saved;
-    lock.require_in_place();
+    require_in_place();
     while (!simulation.finished() && !stopped(observer)) {
         simulation.advance(recorder);
         report_progress(observer, simulation, recorder, settings, "simulating");
         const Clock::time_point now = Clock::now();
         const bool is_due = seconds_between(saved, now) >= settings.checkpoint_every_s;
-        // Not after each of many short steps: it asks the system twice.
+        // Not after each of many short steps: it asks the system.
         if (is_due || seconds_between(looked, now) >= kLookEvery_s) {
-            lock.require_in_place();
+            require_in_place();
             looked = now;
         }
         if (!is_due) continue;
         recorder.save(simulation, seconds_since(begin));
         saved = Clock::now();
     }
-    lock.require_in_place();
+    require_in_place();
     recorder.save(simulation, seconds_since(begin), settings.checkpoint || !simulation.finished());
     report_progress(observer, simulation, recorder, settings, "simulating");
 }
@@ -147,6 +149,13 @@ struct Claim {
     std::vector<std::filesystem::path> replaced;
 };
 
+// Throws Error(io) for a link in place of a file of the run that is replaced again and again: it is that of another one.
+void refuse_link(const std::filesystem::path& file) {
+    std::error_code error;
+    if (std::filesystem::is_symlink(std::filesystem::symlink_status(file, error)))
+        throw Error(ErrorCode::io, file.string() + ": is a link, which is not followed here");
+}
+
 // Makes sure that nothing is lost where the run is to write, that it is there, and that nobody else writes there. Throws as
 // run_scene().
 Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
@@ -155,7 +164,9 @@ Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const s
     const std::vector<std::filesystem::path> parts =
         parts_of_run(folder, settings.scene, settings.range, settings.render);
     for (const std::filesystem::path& part : parts) claim.held.hold(part);  // before they are looked at
-    if (!settings.resume) {
+    if (settings.resume) {
+        for (const std::filesystem::path& file : {folder.manifest(), folder.checkpoint()}) refuse_link(file);
+    } else {
         for (bool is_more = true; is_more;) {
             is_more = false;
             claim.replaced = earlier_files(folder);
@@ -168,7 +179,7 @@ Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const s
     }
     for (const std::filesystem::path& part : parts) create_folders(part);
     if (settings.range.has_frames()) refuse_shared_density_folders(folder, settings.scene);
-    for (const std::filesystem::path& part : parts) claim.held.hold(part);  // those that are new
+    claim.held.hold_in_place(parts);  // those that are new, too
     return claim;
 }
 
@@ -259,8 +270,13 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     if (resumption == Resumption::complete) return report_of_complete(settings, folder);
     settings.resume = resumption == Resumption::go_on;
     std::vector<RunInput> inputs = inputs_of(settings);
-    Claim claim = claim_folder(folder, settings, inputs, resumption, *lock);
-    remove_leftovers(folder, claim.held);
+    const auto claim = std::make_shared<Claim>(claim_folder(folder, settings, inputs, resumption, *lock));
+    const auto require_in_place = [lock, claim] {
+        lock->require_in_place();
+        claim->held.require_in_place();
+    };
+    recorder.set_guard(require_in_place);
+    remove_leftovers(folder, claim->held);
     Simulation& simulation =
         made.emplace(settings.resume   ? resumed_simulation(settings, folder, inputs)
                      : settings.branch ? branched_simulation(settings, folder)
@@ -281,9 +297,9 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         if (!was_complete) recorder.write_manifest(false, seconds_since(begin));
         recorder.cut_tables();
     } else if (settings.branch) {
-        recorder.begin_branch(simulation, claim.replaced);
+        recorder.begin_branch(simulation, claim->replaced);
     } else {
-        remove_files(claim.replaced);
+        remove_files(claim->replaced);
         recorder.begin();
     }
     recorder.start_video(simulation, observer.stop);
@@ -296,16 +312,16 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     }
 
     try {
-        simulate(simulation, recorder, settings, observer, *lock, begin);
+        simulate(simulation, recorder, settings, observer, require_in_place, begin);
     } catch (...) {
         // What failed in a folder that is gone failed for that; and in a new one of its name another run may be at work.
-        lock->require_in_place();
+        require_in_place();
         recorder.list_finished_frames(seconds_since(begin));
         throw;
     }
     const bool complete = simulation.finished() && encode(simulation, recorder, settings, observer);
     if (complete) {
-        lock->require_in_place();
+        require_in_place();
         recorder.require_frames("was removed while the run was writing");
         recorder.write_manifest(true, seconds_since(begin));
         if (!settings.checkpoint) remove_checkpoint(folder);

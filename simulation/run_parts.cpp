@@ -56,6 +56,22 @@ bool HeldFolders::hold(const std::filesystem::path& folder) {
     return true;
 }
 
+void HeldFolders::hold_in_place(const std::vector<std::filesystem::path>& folders) {
+    for (const std::filesystem::path& folder : folders) {
+        hold(folder);
+        if (const std::optional<FileIdentity> identity = identity_behind(folder))
+            places_.emplace_back(folder, *identity);
+    }
+}
+
+void HeldFolders::require_in_place() const {
+    for (const auto& [folder, identity] : places_)
+        if (identity_behind(folder) != identity)
+            throw Error(
+                ErrorCode::io,
+                folder.string() + ": the folder was removed or exchanged while the run was writing into it");
+}
+
 bool HeldFolders::can_hold(const std::filesystem::path& folder) {
     try {
         hold(folder);

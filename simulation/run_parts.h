@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "core/paths.h"
@@ -35,9 +36,15 @@ class HeldFolders {
     bool hold(const std::filesystem::path& folder);
     // Returns whether a folder is locked, and tries to lock it. False, too, on file systems without locks.
     bool can_hold(const std::filesystem::path& folder);
+    // Locks the folders that a run writes to, and keeps where their paths lead. Throws as hold().
+    void hold_in_place(const std::vector<std::filesystem::path>& folders);
+    // Throws Error(io) where one of these is not there any more, or another folder or a link is in its place:
+    // what is written would go where no lock is held. Thread-safe once all are held.
+    void require_in_place() const;
 
   private:
     std::map<FileIdentity, bool> known_;  // whether they are locked
+    std::vector<std::pair<std::filesystem::path, FileIdentity>> places_;
     std::vector<FolderLock> locks_;
 };
 

@@ -322,10 +322,9 @@ void do_pending(Editor& editor) {
     };
     attempt(editor, [&] {
         if (what == Pending::close) {
-            editor.is_answered = true;
             for (std::size_t n = 0; n < editor.scenes.size(); ++n) {
                 const OpenScene& scene = n == editor.shown ? editor : editor.scenes[n];
-                if (n != editor.shown) scene.document->look_at_disk();
+                scene.document->look_at_disk();  // a file may have gone while something was asked
                 if (scene.is_answered || !scene.document->is_modified()) continue;
                 show_scene(editor, n);  // it is asked about next
                 editor.pending = Pending::close;

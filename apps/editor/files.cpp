@@ -103,22 +103,26 @@ std::string name_in_scene(const Editor& editor, const fs::path& path) {
     if (folder.empty()) folder = fs::current_path(error);
     const fs::path relative = fs::proximate(fs::absolute(path), fs::absolute(folder), error);
     const bool below = !error && !relative.empty() && *relative.begin() != "..";
-    return below ? relative.generic_string() : normal_path(fs::absolute(path)).string();
+    const std::string name = below ? relative.generic_string() : normal_path(fs::absolute(path)).string();
+    if (find_invalid_utf8(name) != name.size())
+        throw Error(ErrorCode::usage, name + ": its name is not UTF-8, which the text of a scene is");
+    return name;
 }
 
 }  // namespace
 
 void start_export(Editor& editor, const fs::path& path) {
     if (editor.exported) throw Error(ErrorCode::usage, "another grid is being written: wait for its end");
-    const std::shared_ptr<const LiveFrame> frame = editor.live->frame();
-    if (!frame || !editor.shown_scene) throw Error(ErrorCode::usage, "there is no grid yet");
-    if (!has_density(*editor.shown_scene))
+    LiveScene::FrameOfScene shown = editor.live->frame_of_scene();
+    const std::shared_ptr<const LiveFrame> frame = shown.frame;
+    if (!frame) throw Error(ErrorCode::usage, "there is no grid yet");
+    if (!has_density(shown.scene))
         throw Error(ErrorCode::usage, "the clouds of this scene are drawn directly: there is no grid");
     auto exported = std::make_unique<BackgroundExport>();
     BackgroundExport& state = *exported;
     state.path = path;
     state.step = frame->frame.step;
-    state.thread = std::thread([&state, frame, scene = *editor.shown_scene] {
+    state.thread = std::thread([&state, frame, scene = std::move(shown.scene)] {
         try {
             const FrameResult& result = frame->frame;
             VdbContent content;

@@ -224,6 +224,11 @@ std::shared_ptr<const LiveFrame> LiveScene::frame() const {
     return frame_;
 }
 
+LiveScene::FrameOfScene LiveScene::frame_of_scene() const {
+    const std::scoped_lock lock(mutex_);
+    return {frame_, drawn_scene_};
+}
+
 LiveStatus LiveScene::status() const {
     const std::scoped_lock lock(mutex_);
     LiveStatus status = status_;

@@ -141,6 +141,12 @@ class LiveScene {
     // Return the newest; null while there is none, or nothing newer than `than`.
     std::shared_ptr<const LivePicture> picture(std::uint64_t than) const;
     std::shared_ptr<const LiveFrame> frame() const;
+    // Returns the newest frame and the scene that it is of, which is not the last one given while that is begun or where it failed.
+    struct FrameOfScene {
+        std::shared_ptr<const LiveFrame> frame;  // null while there is none
+        Scene scene;
+    };
+    FrameOfScene frame_of_scene() const;
     LiveStatus status() const;
     // Copies the rows of steps from `from` on.
     std::vector<LiveStep> steps(std::uint64_t from = 0) const;

@@ -66,6 +66,7 @@ void unsaved_dialog(Editor& editor) {
     }
     ImGui::SameLine();
     if (button(editor, "Discard them")) {
+        editor.is_answered = true;
         do_pending(editor);
         ImGui::CloseCurrentPopup();
     }

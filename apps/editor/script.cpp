@@ -103,7 +103,13 @@ Script::Script(const std::filesystem::path& path) : path_(path) {
         ++number;
         std::istringstream in(text);
         Line line{number, {}};
-        for (std::string word; in >> std::quoted(word);) line.words.push_back(word);
+        while (!(in >> std::ws).eof()) {
+            std::string word;
+            if (!(in >> std::quoted(word)))
+                throw Error(ErrorCode::usage, path.string() + ":" + std::to_string(number) + ": '" + text +
+                                                  "' has a quotation mark that is not closed");
+            line.words.push_back(word);
+        }
         if (line.words.empty() || line.words.front().starts_with('#')) continue;
         const auto known = commands().find(line.words.front());
         if (known == commands().end() || int(line.words.size()) - 1 < known->second) {

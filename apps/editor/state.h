@@ -150,7 +150,7 @@ struct OpenScene {
 
     SceneDocument::Disk disk = SceneDocument::Disk::same;  // as it was last said
     std::vector<LeftAutosave> left_autosaves;  // of earlier sessions, that the user is asked about
-    bool is_answered = false;                  // at the end of the program: saved or discarded
+    bool is_answered = false;                  // at the end of the program: its edits are discarded
 };
 
 // Returns a text with an edit made in it.

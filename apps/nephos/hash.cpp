@@ -85,6 +85,7 @@ int hash(const HashArguments& a) {
             hashes.push_back(hash);
         } else if (a.check.empty()) {
             output.line(line);
+            output.require_reader();
         }
         bar.update(step);
         if (step == steps) break;

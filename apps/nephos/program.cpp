@@ -137,13 +137,12 @@ int run_command(CLI::App& app, int argc, const char* const* argv, const EditFunc
 // The only place where exceptions end.
 int guarded(int argc, const char* const* argv, const EditFunction& edit) {
     CLI::App app;
-    int status = 0;
     try {
-        status = run_command(app, argc, argv, edit);
+        const int status = run_command(app, argc, argv, edit);
         Output().flush();
         return status;
-    } catch (const OutputClosed&) {  // a reader that goes away is no error, and hides none
-        return status;
+    } catch (const OutputClosed&) {
+        return 0;
     } catch (const SceneErrors& error) {
         print_scene_errors(error);
         return int(error.code());

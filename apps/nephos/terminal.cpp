@@ -18,8 +18,11 @@
 namespace nephos {
 namespace {
 
-[[noreturn]] void output_failed(int error) {
-    if (error == EPIPE) throw OutputClosed{};
+bool reader_is_gone = false;  // of the one standard output
+
+void output_failed(int error) {
+    reader_is_gone = error == EPIPE;
+    if (reader_is_gone) return;
     throw Error(ErrorCode::io, fmt::format("standard output: cannot write: {}", std::strerror(error)));
 }
 
@@ -60,6 +63,7 @@ std::string escaped_lines(std::string_view text) { return escaped(text, "\n\t");
 void Output::write(std::string_view text) { write_styled(escaped_lines(text)); }
 
 void Output::write_styled(std::string_view text) {
+    if (reader_is_gone) return;
     if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) output_failed(errno);
 }
 
@@ -69,7 +73,12 @@ void Output::line(std::string_view text) {
 }
 
 void Output::flush() {
+    if (reader_is_gone) return;
     if (std::fflush(stdout) != 0) output_failed(errno);
+}
+
+void Output::require_reader() const {
+    if (reader_is_gone) throw OutputClosed{};
 }
 
 bool colours_on(std::FILE* stream) {

@@ -20,14 +20,14 @@
 
 namespace nephos {
 
-// Thrown by Output when the reader of standard output has gone (`nephos hash ... | head`): nothing more to
-// say to anyone, and no failure.
+// Thrown by Output::require_reader().
 struct OutputClosed {};
 
-// Standard output, checked: a full disk or a closed pipe is not silent.
+// Standard output, checked: a full disk is not silent. Once its reader has gone (`nephos verify ... | head`) there is nobody to
+// say anything to: the rest is dropped, while the work goes on to its end and its status.
 class Output {
   public:
-    // Writes text, escaped. Throws OutputClosed, or Error(io) with the reason.
+    // Writes text, escaped. Throws Error(io) with the reason.
     void write(std::string_view text);
     // Writes text made of styled() and of escaped() pieces, as it is; throws as write().
     void write_styled(std::string_view text);
@@ -35,6 +35,9 @@ class Output {
     void line(std::string_view text);
     // Flushes before the end of the program, so that a late failure is seen; throws as write().
     void flush();
+    // For what is done to be printed alone (`nephos hash ... | head`): throws OutputClosed, which ends the program with
+    // status 0, when the reader was found to have gone.
+    void require_reader() const;
 };
 
 // Returns true when colours may be used on stdout or stderr.

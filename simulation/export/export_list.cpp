@@ -228,6 +228,10 @@ std::vector<std::string> ExportList::remove_left_over() const {
         std::error_code error;
         const std::filesystem::path path = folder_ / name;
         if (listed.contains(name) || !std::filesystem::is_regular_file(path, error)) continue;
+        if (!is_same_place(path.parent_path(), folder_)) {  // no export has written there
+            notes.push_back(path.string() + ": is not in the folder itself: it stays");
+            continue;
+        }
         if (!(file_digest(path) == file.digest)) {
             notes.push_back(path.string() + ": is of an earlier export and was changed since: it stays");
             continue;

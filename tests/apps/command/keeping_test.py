@@ -475,6 +475,36 @@ class Keeping(Case):
             after = self.files("done")
             self.assertEqual([path for path in sorted({*before, *after}) if before.get(path) != after.get(path)], [])
 
+    def test_a_part_that_is_exchanged_ends_the_run(self):
+        """A link to the frames of another run, or a folder of these, in place of its own: nothing is written there."""
+        self.call(*self.plain, "--seed", "8", "--set", "time.steps=600", "--out", "done")
+        before = self.files("done")
+        for n in range(6):
+            out = self.folder / f"out{n}"
+            process = subprocess.Popen([NEPHOS, *map(str, self.plain), "--seed", "7", "--set", "time.steps=600", "--out", out, "-j", "1"],
+                                       cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+            while process.poll() is None and not (out / "density/tiny_0001.vdb").exists():
+                pass
+            time.sleep(0.002 * n)
+            (out / "density").rename(self.folder / f"moved{n}")
+            (out / "density").symlink_to(self.folder / "done/density")
+            _, said = process.communicate(timeout=60)
+            if process.returncode != 0:  # it may have been done before
+                self.assertEqual(process.returncode, 3, said)
+            self.assertEqual(self.files("done"), before)
+
+    def test_a_run_with_links_in_place_of_its_files_is_not_resumed(self):
+        """They lead to another run's, which would be replaced."""
+        self.call(*self.plain, "--out", "a")
+        for name in ("manifest.json", "checkpoint.nephos"):
+            shutil.copytree(self.folder / "a", self.folder / "b")
+            (self.folder / "b" / name).unlink()
+            (self.folder / "b" / name).symlink_to(self.folder / "a" / name)
+            before = self.files("a")
+            self.assertIn(f"{name}: is a link", self.call(*self.plain, "--resume", "--set", "time.steps=90", "--out", "b", status=3).stderr)
+            self.assertEqual(self.files("a"), before)
+            shutil.rmtree(self.folder / "b")
+
     def test_a_folder_that_is_moved_away_does_not_come_back(self):
         for n in range(6):
             process = subprocess.Popen([NEPHOS, "run", self.scene, "--checkpoint-every", "0", "--set", "time.steps=20000", "--statistics-only", "--out", "out", "-q"],

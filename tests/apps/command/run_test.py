@@ -305,6 +305,20 @@ class Branch(Case):
             del manifest["timing"], manifest["xxh3"]
         self.assertEqual(*manifests)
 
+    def test_needs_the_manifest_of_the_other_run(self):
+        """It says whose the statistics are that lie beside the checkpoint; a link leads to where these are."""
+        scene = self.write("tiny.toml", LONG.replace("steps = 10000", "steps = 6"))
+        self.call("run", scene, "--no-render", "--out", "source")
+        (self.folder / "alone").mkdir()
+        for name in ("checkpoint.nephos", "statistics.csv"):
+            shutil.copy(self.folder / "source" / name, self.folder / "alone")
+        branch = ["run", scene, "--no-render", "--set", "time.steps=12", "--from"]
+        self.assertIn("has no manifest.json beside it", self.call(*branch, "alone", "--out", "b", status=3).stderr)
+        (self.folder / "link").symlink_to("source/checkpoint.nephos")
+        self.call(*branch, "link", "--out", "c")
+        self.call(*branch, "source", "--out", "d")
+        self.assertEqual(*((self.folder / name / "statistics.csv").read_bytes() for name in "cd"))
+
     def test_goes_on_without_the_other_run(self):
         self.begin()
         ways = [("--from", "source", *self.BRANCH), ("--from", "source/checkpoint.nephos", *self.BRANCH), ("--no-render",)]

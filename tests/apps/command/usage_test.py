@@ -179,13 +179,16 @@ class Terminal(Case):
         damaged = bytearray(frame.read_bytes())
         damaged[-40] ^= 1
         frame.write_bytes(damaged)
-        for arguments in (["verify", "checked"], ["verify", "checked", "--json"]):
+        bad = self.write("bad.toml", "".join(f"unknown_{n} = 1\n" for n in range(400)))
+        for arguments, status, says in ((["verify", "checked"], 1, "is not what it claims to be"), (["verify", "checked", "--json"], 1, "is not what it claims to be"),
+                                        (["validate", bad, "--json"], 2, ""), (["info", *[str(frame)] * 40, "none.vdb", "--json"], 3, "none.vdb"),
+                                        (["validate", *[self.scene] * 40, "none.toml", "--print"], 3, "none.toml")):
             read, write = os.pipe()
             os.close(read)
             result = subprocess.run([NEPHOS, *arguments], stdout=write, stderr=subprocess.PIPE, text=True, timeout=60, cwd=self.folder)
             os.close(write)
-            self.assertEqual(result.returncode, 1, result.stderr)
-            self.assertIn("is not what it claims to be", result.stderr)
+            self.assertEqual(result.returncode, status, result.stderr)
+            self.assertIn(says, result.stderr)
 
     def test_a_full_stdout_is_an_error(self):
         with open("/dev/full", "w") as full:

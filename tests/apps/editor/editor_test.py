@@ -701,6 +701,8 @@ class Failures(Case):
 
     def test_script(self):
         self.assertIn("no command", self.edit(script="fly away\n", status=2))
+        for line in ('type new "name', 'click "abc'):
+            self.assertIn("a quotation mark that is not closed", self.edit(script=f"{line}\n", status=2))
         self.assertIn("no control", self.edit(script="click nothing of that name\n", status=1))
 
 

@@ -2,18 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is opened in the place of another scene, or dropped on the window, and a file that is gone. See case.py."""
 
+import json
 import subprocess
 import sys
 import tomllib
 import unittest
 
-from case import NEPHOS, Case
-from kept import MODELS, WIND
+from case import NEPHOS
+from kept import MODELS, WIND, Kept
 
 STATE = 'seed = 4\n[lattice]\ncells = [16, 16, 12]\n'
 
 
-class Opening(Case):
+class Opening(Kept):
     def two(self, first, second):
         """A folder of two scenes; the first is opened with it."""
         for name, text in (("a.toml", first), ("b.toml", second)):
@@ -77,12 +78,37 @@ class Opening(Case):
         editor = subprocess.Popen(self.command(scene, script='wait-step 1\nhashes ready.txt\nwait 2\nkey CTRL+Q\nwait 0.5\n'
                                                              'expect-control "unsaved b.toml"\nclick "Save them"\nwait 0.5\n'),
                                   cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
-        while not ready.exists():
-            self.assertIsNone(editor.poll(), "it ended")
+        self.wait_for(ready, editor)
         scene.unlink()
         errors = editor.communicate(timeout=120)[1]
         self.assertEqual(editor.returncode, 0, errors)
         self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
+
+    def test_a_file_that_goes_while_something_is_asked_is_asked_about(self):
+        """The answer about another scene says nothing of it."""
+        scene = self.two(STATE, STATE)
+        ready = self.folder / "ready.txt"
+        editor = subprocess.Popen(self.command(scene, script='wait-step 1\nclick "new simulation"\nwait-step 1\nclick scene\nclick "tab Properties"\nset seed 9\n'
+                                                             'wait 0.3\nclick "simulation 1"\nwait 0.3\nkey CTRL+Q\nwait 0.5\nhashes ready.txt\nwait 2\n'
+                                                             'click "Discard them"\nwait 0.5\nexpect-control "unsaved b.toml"\nclick "Save them"\nwait 0.5\n'),
+                                  cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+        self.wait_for(ready, editor)
+        scene.unlink()
+        errors = editor.communicate(timeout=120)[1]
+        self.assertEqual(editor.returncode, 0, errors)
+        self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
+
+    def test_a_grid_has_the_scene_that_it_is_of(self):
+        """Not the one that could not be simulated, whose text is in the window."""
+        scene = self.two(STATE, STATE)
+        self.edit(scene, script='wait-step 3\nkey SPACE\nwait 0.5\nclick "menu File"\nclick "menu Export the grid..."\nwait 0.3\nset "file name" good.vdb\nwait 1\n'
+                                'click "tab Text"\nclick text\nkey CTRL+A\ntype lattice={cells=[4000,4000,4000]}\nwait 1\n'
+                                'click "menu File"\nclick "menu Export the grid..."\nwait 0.3\nset "file name" later.vdb\nwait 1\n')
+        good, later = (json.loads(subprocess.run([NEPHOS, "info", "--json", self.folder / name], check=True, capture_output=True, text=True).stdout)
+                       for name in ("good.vdb", "later.vdb"))
+        for info in (good, later):
+            del info["file"]
+        self.assertEqual(good, later)
 
 
 if __name__ == "__main__":
