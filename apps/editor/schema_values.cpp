@@ -209,7 +209,7 @@ double number_under(const Node& element, const std::string& key) {
     return entry->value.kind == Node::Kind::integer ? double(entry->value.integer) : entry->value.number;
 }
 
-// How far a new element stands behind the last one.
+// Returns how far a new element stands behind the last one.
 double step_of(const Key& key) {
     if (key.name == "state") return 0.25;
     return key.name == "height_m" ? 500 : 600;

@@ -71,32 +71,25 @@ class Opening(Kept):
         self.assertIn("seed = 7", scene.read_text(encoding="utf-8"))
         self.assertIn("grid.vdb", scene.read_text(encoding="utf-8"))
 
-    def test_a_file_that_is_gone_is_unsaved(self):
-        """Its text is nowhere else: the editor asks before it ends, and saving makes the file anew."""
-        scene = self.two(STATE, STATE)
-        ready = self.folder / "ready.txt"
-        editor = subprocess.Popen(self.command(scene, script='wait-step 1\nhashes ready.txt\nwait 2\nkey CTRL+Q\nwait 0.5\n'
-                                                             'expect-control "unsaved b.toml"\nclick "Save them"\nwait 0.5\n'),
-                                  cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+    def removed_at(self, script):
+        """Removes the scene when such a script writes ready.txt; its end saves it."""
+        scene, ready = self.two(STATE, STATE), self.folder / "ready.txt"
+        script += 'expect-control "unsaved b.toml"\nclick "Save them"\nwait 0.5\n'
+        editor = subprocess.Popen(self.command(scene, script=script), cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
         self.wait_for(ready, editor)
         scene.unlink()
         errors = editor.communicate(timeout=120)[1]
         self.assertEqual(editor.returncode, 0, errors)
         self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
 
+    def test_a_file_that_is_gone_is_unsaved(self):
+        """Its text is nowhere else: the editor asks before it ends, and saving makes the file anew."""
+        self.removed_at("wait-step 1\nhashes ready.txt\nwait 2\nkey CTRL+Q\nwait 0.5\n")
+
     def test_a_file_that_goes_while_something_is_asked_is_asked_about(self):
         """The answer about another scene says nothing of it."""
-        scene = self.two(STATE, STATE)
-        ready = self.folder / "ready.txt"
-        editor = subprocess.Popen(self.command(scene, script='wait-step 1\nclick "new simulation"\nwait-step 1\nclick scene\nclick "tab Properties"\nset seed 9\n'
-                                                             'wait 0.3\nclick "simulation 1"\nwait 0.3\nkey CTRL+Q\nwait 0.5\nhashes ready.txt\nwait 2\n'
-                                                             'click "Discard them"\nwait 0.5\nexpect-control "unsaved b.toml"\nclick "Save them"\nwait 0.5\n'),
-                                  cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
-        self.wait_for(ready, editor)
-        scene.unlink()
-        errors = editor.communicate(timeout=120)[1]
-        self.assertEqual(editor.returncode, 0, errors)
-        self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
+        self.removed_at('wait-step 1\nclick "new simulation"\nwait-step 1\nclick scene\nclick "tab Properties"\nset seed 9\nwait 0.3\nclick "simulation 1"\n'
+                        'wait 0.3\nkey CTRL+Q\nwait 0.5\nhashes ready.txt\nwait 2\nclick "Discard them"\nwait 0.5\n')
 
     def test_a_grid_has_the_scene_that_it_is_of(self):
         """Not the one that could not be simulated, whose text is in the window."""
