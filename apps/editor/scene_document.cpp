@@ -26,8 +26,8 @@ std::optional<FileStamp> stamp_of(const fs::path& path) {
     return stamp == FileStamp{} ? std::nullopt : std::optional(stamp);
 }
 
-// The name of the edits of a scene that are kept in another folder: with the path of its own, or its checksum where that
-// is too long for a name.
+// Returns the name of the edits of a scene that are kept in another folder: with the path of its own, or its checksum
+// where that is too long for a name.
 std::string name_elsewhere(const fs::path& folder, const std::string& name) {
     constexpr std::size_t kLongest = 128;
     std::string path = normal_path(fs::absolute(folder)).string();

@@ -176,6 +176,12 @@ Node parsed_value(const std::string& toml) {
     return std::move(parsed->entries.front().value);
 }
 
+double number_in(const Node& table, std::string_view key) {
+    const Entry* entry = table.find(key);
+    if (entry == nullptr) return 0;
+    return entry->value.kind == Node::Kind::integer ? double(entry->value.integer) : entry->value.number;
+}
+
 std::vector<std::string> names_of(const Node* array) {
     std::vector<std::string> names;
     if (array == nullptr) return names;
@@ -203,12 +209,6 @@ std::string unused_name(std::string_view start, const std::vector<std::string>& 
 
 namespace {
 
-double number_under(const Node& element, const std::string& key) {
-    const Entry* const entry = element.find(key);
-    if (entry == nullptr) return 0;
-    return entry->value.kind == Node::Kind::integer ? double(entry->value.integer) : entry->value.number;
-}
-
 // Returns how far a new element stands behind the last one.
 double step_of(const Key& key) {
     if (key.name == "state") return 0.25;
@@ -222,9 +222,9 @@ std::optional<TextEntry> place_of_copy(const Key& tables, const Node& array, std
         const bool rises = key.name == "time_s" ? tables.name != "lightning"
                                                 : tables.name == "levels" && key.name == "height_m";
         if (!rises) continue;
-        const double here = number_under(array.items.at(index), key.name);
+        const double here = number_in(array.items.at(index), key.name);
         const double next = index + 1 < array.items.size()
-                                ? number_under(array.items[index + 1], key.name)
+                                ? number_in(array.items[index + 1], key.name)
                                 : std::min(here + 2 * step_of(key), key.limits.max);
         return TextEntry{key.name, number_text(here + 0.5 * (next - here), 9)};
     }
@@ -268,7 +268,7 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
             value += value.size() > 3 ? " }]" : "}]";
         } else if (key.kind == KeyKind::number && rises_from_item_to_item(tables, key) && array != nullptr) {
             double last = 0;
-            for (const Node& item : array->items) last = std::max(last, number_under(item, key.name));
+            for (const Node& item : array->items) last = std::max(last, number_in(item, key.name));
             value = number_text(array->items.empty() ? 0 : std::min(last + step_of(key), key.limits.max), 6);
         } else if (key.name == "position_m" && tables.section->find("target_m") != nullptr) {
             value = default_of_kind(key, {centre_m.x, centre_m.y - 4000, std::max(2.0, centre_m.z - 500)});

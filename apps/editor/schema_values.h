@@ -53,6 +53,8 @@ std::optional<TextEntry> place_of_copy(const Key& tables, const Node& array, std
 
 // Returns a name that no element has: "cloud 2".
 std::string unused_name(std::string_view start, const std::vector<std::string>& taken);
+// Returns the number under a key of a table; 0 where there is none.
+double number_in(const Node& table, std::string_view key);
 // Returns the texts under `name` of all elements of an array.
 std::vector<std::string> names_of(const Node* array);
 

@@ -154,7 +154,7 @@ void captions(Editor& editor, const LiveStatus& status) {
     }
 }
 
-// A place as a scene has it, to the centimetre.
+// Returns a place as a scene has it, to the centimetre.
 std::string place_toml(const Vec3& place_m) {
     const auto part = [](double metres) { return number_text(std::round(100 * metres) / 100, 10); };
     return "[" + part(place_m.x) + ", " + part(place_m.y) + ", " + part(place_m.z) + "]";
@@ -168,7 +168,7 @@ std::vector<KeyFrame> key_frames(const std::vector<CameraKey>& keys) {
     return out;
 }
 
-// The path of a camera with a key frame at a time.
+// Returns the path of a camera with a key frame at a time.
 std::vector<CameraKey> camera_with_key(std::vector<CameraKey> path, const Camera& camera, double time_s) {
     const auto at = std::ranges::lower_bound(path, time_s, {}, &CameraKey::time_s);
     const CameraKey key{time_s, camera.position_m, camera.target_m};

@@ -21,12 +21,6 @@ bool has_any(const Node& level, const std::array<std::string_view, 2>& keys) {
 
 }  // namespace
 
-double number_in(const Node& table, std::string_view key) {
-    const Entry* entry = table.find(key);
-    if (entry == nullptr) return 0;
-    return entry->value.kind == Node::Kind::integer ? double(entry->value.integer) : entry->value.number;
-}
-
 bool is_polar(const Node& level) { return has_any(level, kPolar); }
 
 Velocity velocity_of(const Node& level) {

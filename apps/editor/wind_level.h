@@ -14,9 +14,6 @@
 
 namespace nephos {
 
-// Returns the number under a key of a table; 0 where there is none.
-double number_in(const Node& table, std::string_view key);
-
 // Returns whether the wind of a level is given by where it comes from and its speed, or one of the two.
 bool is_polar(const Node& level);
 
