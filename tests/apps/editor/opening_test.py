@@ -72,7 +72,7 @@ class Opening(Kept):
         self.assertIn("grid.vdb", scene.read_text(encoding="utf-8"))
 
     def removed_at(self, script):
-        """Removes the scene when such a script writes ready.txt; its end saves it."""
+        """Removes the scene when such a script writes its hashes; its end saves it."""
         scene, ready = self.two(STATE, STATE), self.folder / "ready.txt"
         script += 'expect-control "unsaved b.toml"\nclick "Save them"\nwait 0.5\n'
         editor = subprocess.Popen(self.command(scene, script=script), cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
