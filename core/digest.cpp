@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <istream>
 #include <new>
 #include <vector>
 
@@ -70,6 +71,23 @@ FileDigest file_digest(const std::filesystem::path& path, std::uint64_t most) {
         digest.add(std::span(piece).first(std::size_t(count)));
         result.bytes += std::uint64_t(count);
     }
+    result.xxh3 = digest.hex();
+    return result;
+}
+
+FileDigest file_digest(std::istream& file, const std::filesystem::path& path, std::uint64_t most) {
+    std::vector<char> piece(kPieceBytes);
+    Digest digest;
+    FileDigest result;
+    file.clear();
+    file.seekg(0);
+    while (file && result.bytes < most) {
+        file.read(piece.data(), std::streamsize(std::min<std::uint64_t>(piece.size(), most - result.bytes)));
+        const auto count = std::size_t(file.gcount());
+        digest.add(std::string_view(piece.data(), count));
+        result.bytes += count;
+    }
+    check_reading(file, path);
     result.xxh3 = digest.hex();
     return result;
 }

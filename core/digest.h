@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <iosfwd>
 #include <memory>
 #include <span>
 #include <string>
@@ -40,6 +41,10 @@ struct FileDigest {
 
 // Reads a regular file, to its end or at most so many bytes. Throws Error(io) naming the path. Thread-safe.
 FileDigest file_digest(const std::filesystem::path& path, std::uint64_t most = ~std::uint64_t{0});
+
+// As that, from the beginning of a file that is open; `path` is for messages.
+FileDigest file_digest(std::istream& file, const std::filesystem::path& path,
+                       std::uint64_t most = ~std::uint64_t{0});
 
 // Returns the checksum of bytes in memory. Thread-safe; pure.
 std::string digest_of(std::span<const std::byte> bytes);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <set>
 
 #include "core/error.h"
 #include "core/math.h"
@@ -11,10 +13,14 @@
 namespace nephos {
 namespace {
 
+// Exactly `a` at 0 and `b` at 1.
+double mix(double a, double b, double fraction) { return fraction == 1 ? b : a + (b - a) * fraction; }
+
 Velocity mix(const Velocity& a, const Velocity& b, double fraction) {
-    return {a.east_m_per_s + (b.east_m_per_s - a.east_m_per_s) * fraction,
-            a.north_m_per_s + (b.north_m_per_s - a.north_m_per_s) * fraction};
+    return {mix(a.east_m_per_s, b.east_m_per_s, fraction), mix(a.north_m_per_s, b.north_m_per_s, fraction)};
 }
+
+double fraction_between(double from, double to, double at) { return (at - from) / (to - from); }
 
 Velocity at_height(const std::vector<WindLevel>& levels, double height_m) {
     if (levels.empty()) return {};
@@ -23,8 +29,42 @@ Velocity at_height(const std::vector<WindLevel>& levels, double height_m) {
     if (above == levels.begin()) return levels.front().velocity;
     if (above == levels.end()) return levels.back().velocity;
     const WindLevel& below = *(above - 1);
-    return mix(below.velocity, above->velocity,
-               (height_m - below.height_m) / (above->height_m - below.height_m));
+    return mix(below.velocity, above->velocity, fraction_between(below.height_m, above->height_m, height_m));
+}
+
+// The key frames around a time; the same one twice where it holds alone.
+struct KeysAround {
+    const WindKeyframe *before, *after;
+};
+
+KeysAround keys_around(const std::vector<WindKeyframe>& keys, double time_s) {
+    const auto after = std::ranges::find_if(keys, [&](const WindKeyframe& k) { return k.time_s >= time_s; });
+    if (after == keys.end()) return {&keys.back(), &keys.back()};
+    const bool alone = after == keys.begin() || after->time_s == time_s;
+    return {alone ? &*after : &*(after - 1), &*after};
+}
+
+Velocity at_level(const KeysAround& keys, double level_m, double time_s) {
+    return mix(at_height(keys.before->levels, level_m), at_height(keys.after->levels, level_m),
+               fraction_between(keys.before->time_s, keys.after->time_s, time_s));
+}
+
+// As profile_at() and between its levels at_height(), without making the profile.
+Velocity between(const KeysAround& keys, double height_m, double time_s) {
+    constexpr double kNone = std::numeric_limits<double>::infinity();
+    double below_m = -kNone, above_m = kNone;
+    for (const WindKeyframe* key : {keys.before, keys.after}) {
+        for (const WindLevel& level : key->levels) {
+            if (level.height_m < height_m)
+                below_m = std::max(below_m, level.height_m);
+            else
+                above_m = std::min(above_m, level.height_m);
+        }
+    }
+    if (above_m == kNone) return at_level(keys, below_m, time_s);
+    const Velocity above = at_level(keys, above_m, time_s);
+    if (below_m == -kNone) return above;
+    return mix(at_level(keys, below_m, time_s), above, fraction_between(below_m, above_m, height_m));
 }
 
 std::int64_t to_fixed(double cells) {
@@ -44,15 +84,23 @@ Velocity velocity_from(double from_deg, double speed_m_per_s) {
     return {0.0 - speed_m_per_s * from.sin, 0.0 - speed_m_per_s * from.cos};
 }
 
+std::vector<WindLevel> profile_at(const Wind& wind, double time_s) {
+    if (wind.keyframes.empty()) return {};
+    const KeysAround keys = keys_around(wind.keyframes, time_s);
+    if (keys.before == keys.after) return keys.after->levels;
+    std::set<double> heights;
+    for (const WindKeyframe* key : {keys.before, keys.after})
+        for (const WindLevel& level : key->levels) heights.insert(level.height_m);
+    std::vector<WindLevel> levels;
+    for (const double height : heights) levels.push_back({height, at_level(keys, height, time_s)});
+    return levels;
+}
+
 Velocity wind_at(const Wind& wind, double height_m, double time_s) {
-    const auto& keys = wind.keyframes;
-    if (keys.empty()) return {};
-    const auto after = std::ranges::find_if(keys, [&](const WindKeyframe& k) { return k.time_s >= time_s; });
-    if (after == keys.begin()) return at_height(keys.front().levels, height_m);
-    if (after == keys.end()) return at_height(keys.back().levels, height_m);
-    const WindKeyframe& before = *(after - 1);
-    return mix(at_height(before.levels, height_m), at_height(after->levels, height_m),
-               (time_s - before.time_s) / (after->time_s - before.time_s));
+    if (wind.keyframes.empty()) return {};
+    const KeysAround keys = keys_around(wind.keyframes, time_s);
+    if (keys.before == keys.after) return at_height(keys.after->levels, height_m);
+    return between(keys, height_m, time_s);
 }
 
 Vec3 wind_at(const Wind& wind, const Vec3& place_m, double time_s) {

@@ -37,8 +37,9 @@ struct WindKeyframe {
     bool operator==(const WindKeyframe&) const = default;
 };
 
-// Profiles over time: linear between keyframes, constant before the first and after the last. Without
-// keyframes the profile is calm.
+// Profiles over time: linear between keyframes, constant before the first and after the last. The profile between two
+// keyframes has the levels of both, and is that of a keyframe with these levels at its time, to the last bit. Without
+// keyframes it is calm.
 struct Wind {
     std::vector<WindKeyframe> keyframes;
     std::vector<WindField> fields{};
@@ -51,6 +52,10 @@ Velocity velocity_from(double from_deg, double speed_m_per_s);
 
 // Returns true when there is neither a profile nor a field.
 inline bool is_calm(const Wind& wind) { return wind.keyframes.empty() && wind.fields.empty(); }
+
+// Returns the levels of the profile at a time: those of a keyframe, or of the two around the time; none without
+// keyframes. Thread-safe; pure.
+std::vector<WindLevel> profile_at(const Wind& wind, double time_s);
 
 // Returns the velocity of the profile alone at a height and time. Thread-safe; pure.
 Velocity wind_at(const Wind& wind, double height_m, double time_s);

@@ -30,8 +30,10 @@ std::filesystem::path checkpoint_of(const std::filesystem::path& from) {
     if (!is_there(from)) refuse("no such run");
     if (!std::filesystem::is_directory(from, error)) {
         if (!is_checkpoint(from)) refuse("is no checkpoint of a run");
+        // What belongs to it lies beside it, or beside what a link leads to.
         const bool is_link = std::filesystem::is_symlink(std::filesystem::symlink_status(from, error));
-        return is_link ? std::filesystem::canonical(from) : from;  // what belongs to it lies beside it
+        const bool is_alone = !is_there(from.parent_path() / "manifest.json");
+        return is_link && is_alone ? std::filesystem::canonical(from) : from;
     }
     const std::filesystem::path checkpoint = from / "checkpoint.nephos";
     if (!is_there(checkpoint)) refuse("holds no checkpoint of a run");
@@ -74,25 +76,6 @@ std::string branch_hash(const std::string& scene, const BranchPoint& point) {
     digest.add(point.state_hash);
     digest.add(std::to_string(point.steps));
     return digest.hex();
-}
-
-// Copies the header and the rows of all steps before `steps`.
-void copy_statistics(const std::filesystem::path& from, const std::filesystem::path& to, std::uint64_t steps,
-                     std::string_view header) {
-    write_pieces_atomically(to, [&](const AppendPiece& append) {
-        constexpr std::size_t kPiece = 1u << 20;  // a table may be larger than memory
-        std::string rows(header);
-        read_statistics(
-            from, steps,
-            [&](std::uint64_t, std::string_view row, const StateHash&) {
-                (rows += row) += '\n';
-                if (rows.size() < kPiece) return;
-                append(rows);
-                rows.clear();
-            },
-            header);
-        append(rows);
-    });
 }
 
 // Frames are counted on from those of the other run. Throws Error(usage) where the scene's numbers and times put a frame that
@@ -208,7 +191,8 @@ void refuse_to_remove_other_run(const RunSettings& settings,
     }
 }
 
-void require_tables_of_other_run(const RunSettings& settings, std::uint64_t steps) {
+std::vector<OtherTable> tables_of_other_run(const RunSettings& settings, const RunFolder& folder,
+                                            std::uint64_t steps) {
     const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
     if (!is_there(parent.manifest()))
         throw Error(
@@ -222,18 +206,37 @@ void require_tables_of_other_run(const RunSettings& settings, std::uint64_t step
                     fmt::format("{}: is not of the run in the folder that it lies in, whose statistics the "
                                 "branch begins with",
                                 settings.branch->checkpoint.string()));
-    require_tables_of_run(parent, run);
-    read_statistics(parent.statistics(), steps, {}, kStatisticsHeader);
+    std::vector<OtherTable> tables;
+    const auto open = [&](const std::filesystem::path& path, const std::filesystem::path& copy,
+                          std::string_view header) {
+        OtherTable& table = tables.emplace_back(path, copy, header, open_stream(path));
+        for (const FileRecord& saved : run.tables)
+            if (parent.folder / saved.path == path) require_table_of_run(table.file, path, saved.digest);
+        read_statistics(table.file, path, steps, {}, header);
+    };
+    open(parent.statistics(), folder.statistics(), kStatisticsHeader);
     for (const LayerOptions& layer : settings.scene.layers)
-        read_statistics(parent.statistics(layer.name), steps, {}, kLayerStatisticsHeader);
+        open(parent.statistics(layer.name), folder.statistics(layer.name), kLayerStatisticsHeader);
+    return tables;
 }
 
-void copy_tables_of_other_run(const RunSettings& settings, const RunFolder& folder, std::uint64_t steps) {
-    const RunFolder parent = folder_of(settings.branch->checkpoint, settings.scene);
-    copy_statistics(parent.statistics(), folder.statistics(), steps, kStatisticsHeader);
-    for (const LayerOptions& layer : settings.scene.layers)
-        copy_statistics(parent.statistics(layer.name), folder.statistics(layer.name), steps,
-                        kLayerStatisticsHeader);
+void copy_rows(std::vector<OtherTable>& tables, std::uint64_t steps) {
+    for (OtherTable& table : tables) {
+        write_pieces_atomically(table.copy, [&](const AppendPiece& append) {
+            constexpr std::size_t kPiece = 1u << 20;  // a table may be larger than memory
+            std::string rows(table.header);
+            read_statistics(
+                table.file, table.path, steps,
+                [&](std::uint64_t, std::string_view row, const StateHash&) {
+                    (rows += row) += '\n';
+                    if (rows.size() < kPiece) return;
+                    append(rows);
+                    rows.clear();
+                },
+                table.header);
+            append(rows);
+        });
+    }
 }
 
 }  // namespace nephos

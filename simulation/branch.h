@@ -4,9 +4,13 @@
 // Runs that branch off another one: they start from its checkpoint, under a scene that may have changed, in a folder of
 // their own. The rows of statistics up to there are those of the other run; frames begin with its next one.
 
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "automaton/checkpoint.h"
 #include "simulation/run_folder.h"
@@ -41,9 +45,18 @@ Simulation branched_simulation(const RunSettings& settings, const RunFolder& fol
 // Throws Error(usage) where one of `files`, which the branch takes the place of, is a table of the other run, by links.
 void refuse_to_remove_other_run(const RunSettings& settings, const std::vector<std::filesystem::path>& files);
 
-// Throws Error(io) unless the other run's statistics, of all layers too, have the rows of all steps before `steps`.
-void require_tables_of_other_run(const RunSettings& settings, std::uint64_t steps);
-// Copies these rows into the folder of the branch. Throws Error(io).
-void copy_tables_of_other_run(const RunSettings& settings, const RunFolder& folder, std::uint64_t steps);
+// A table of the other run, open: what is copied is of the file that was checked, whatever gets its name meanwhile.
+struct OtherTable {
+    std::filesystem::path path, copy;  // in the folder of the branch
+    std::string_view header;
+    std::ifstream file;
+};
+
+// Opens the other run's statistics, of all layers too. Throws Error(io) unless they are those that it has saved, and have the
+// rows of all steps before `steps`.
+std::vector<OtherTable> tables_of_other_run(const RunSettings& settings, const RunFolder& folder,
+                                            std::uint64_t steps);
+// Copies these rows. Throws Error(io).
+void copy_rows(std::vector<OtherTable>& tables, std::uint64_t steps);
 
 }  // namespace nephos

@@ -26,12 +26,6 @@ namespace {
 
 using Parameters = std::vector<std::pair<std::string, std::string>>;
 
-void remove_file(const std::filesystem::path& path) {
-    std::error_code error;
-    std::filesystem::remove(path, error);
-    if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
-}
-
 // Parts of the folder that hold frames: a folder of its own for the densities of each layer.
 std::vector<std::string> frame_parts(const RunFolder& folder) {
     std::vector<std::string> parts{"density", "frames"};
@@ -236,10 +230,6 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     return files;
 }
 
-void remove_files(const std::vector<std::filesystem::path>& files) {
-    for (const std::filesystem::path& path : files) remove_file(path);
-}
-
 void remove_leftovers(const RunFolder& folder, HeldFolders& held) {
     const auto remove_if = [&](const std::filesystem::path& part, const auto& is_ours) {
         const std::filesystem::path place = part.empty() ? folder.folder : folder.folder / part;
@@ -248,7 +238,7 @@ void remove_leftovers(const RunFolder& folder, HeldFolders& held) {
             const std::string published = published_name(name);
             if (!published.empty() && is_ours(published)) leftovers.push_back(place / name);
         }
-        if (!leftovers.empty() && held.can_hold(place)) remove_files(leftovers);
+        if (!leftovers.empty() && held.can_hold(place)) held.remove(leftovers);
     };
     remove_if({}, [&](const std::string& name) {
         return name == folder.manifest().filename() || name == folder.checkpoint().filename() ||
@@ -366,8 +356,6 @@ void require_tables_of_run(const RunFolder& folder, const EarlierRun& run, std::
         if (const std::filesystem::path path = folder.folder / table.path; is_there(path))
             require_table_of_run(path, table.digest, cure);
 }
-
-void remove_checkpoint(const RunFolder& folder) { remove_file(folder.checkpoint()); }
 
 Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder,
                               const std::vector<RunInput>& inputs) {

@@ -22,9 +22,6 @@ namespace nephos {
 // run. Throws ReadFailure.
 std::vector<std::filesystem::path> earlier_files(const RunFolder& folder);
 
-// Removes them, in this order. Throws Error(io).
-void remove_files(const std::vector<std::filesystem::path>& files);
-
 // Removes the temporary files of a run that was killed, in the folders that can be held: where another run is
 // at work they are no leftovers. Throws Error(io).
 void remove_leftovers(const RunFolder& folder, HeldFolders& held);
@@ -61,9 +58,6 @@ Resumption find_resumption(const RunSettings& settings, const RunFolder& folder)
 // Throws Error(io) unless the tables of statistics begin with what the manifest says that the run had
 // written, as require_table_of_run(). One that is not there is its reader's to miss.
 void require_tables_of_run(const RunFolder& folder, const EarlierRun& run, std::string_view cure = {});
-
-// Removes the checkpoint of a complete run. Throws Error(io).
-void remove_checkpoint(const RunFolder& folder);
 
 // Returns the simulation of the folder's checkpoint. The scene may be that of the first call with a larger
 // `time.steps`; frames that were written before then name the hash of that scene. `inputs`: the files that

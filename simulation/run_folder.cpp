@@ -149,11 +149,23 @@ struct Claim {
     std::vector<std::filesystem::path> replaced;
 };
 
-// Throws Error(io) for a link in place of a file of the run that is replaced again and again: it is that of another one.
-void refuse_link(const std::filesystem::path& file) {
+// Throws Error(io) for a link in place of a file of the run that is replaced again and again: it would lead to that of another.
+void refuse_links(const RunFolder& folder) {
     std::error_code error;
-    if (std::filesystem::is_symlink(std::filesystem::symlink_status(file, error)))
-        throw Error(ErrorCode::io, file.string() + ": is a link, which is not followed here");
+    for (const std::filesystem::path& file : {folder.manifest(), folder.checkpoint()})
+        if (std::filesystem::is_symlink(std::filesystem::symlink_status(file, error)))
+            throw Error(ErrorCode::io, file.string() + ": is a link, which is not followed here");
+}
+
+// Throws Error(io) where the tables of layers are in the folder of another run, whose tables they are.
+void refuse_tables_of_other_run(const RunFolder& folder) {
+    const std::filesystem::path tables = folder.folder / "statistics";
+    std::error_code error;
+    if (!std::filesystem::is_symlink(std::filesystem::symlink_status(tables, error))) return;
+    const std::filesystem::path there = std::filesystem::weakly_canonical(tables, error).parent_path();
+    if (!error && is_there(there / "manifest.json"))
+        throw Error(ErrorCode::io, tables.string() + ": leads into another run, " + there.string() +
+                                       ", whose tables would be changed");
 }
 
 // Makes sure that nothing is lost where the run is to write, that it is there, and that nobody else writes there. Throws as
@@ -161,11 +173,13 @@ void refuse_link(const std::filesystem::path& file) {
 Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
                    Resumption found, const FolderLock& lock) {
     Claim claim{HeldFolders(folder.folder, lock), {}};
+    lock.require_in_place();  // what is known is the folder that is locked
     const std::vector<std::filesystem::path> parts =
         parts_of_run(folder, settings.scene, settings.range, settings.render);
     for (const std::filesystem::path& part : parts) claim.held.hold(part);  // before they are looked at
     if (settings.resume) {
-        for (const std::filesystem::path& file : {folder.manifest(), folder.checkpoint()}) refuse_link(file);
+        refuse_links(folder);
+        refuse_tables_of_other_run(folder);
     } else {
         for (bool is_more = true; is_more;) {
             is_more = false;
@@ -180,6 +194,7 @@ Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const s
     for (const std::filesystem::path& part : parts) create_folders(part);
     if (settings.range.has_frames()) refuse_shared_density_folders(folder, settings.scene);
     claim.held.hold_in_place(parts);  // those that are new, too
+    lock.require_in_place();          // what was looked at, and is held, was in this folder
     return claim;
 }
 
@@ -271,9 +286,10 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     settings.resume = resumption == Resumption::go_on;
     std::vector<RunInput> inputs = inputs_of(settings);
     const auto claim = std::make_shared<Claim>(claim_folder(folder, settings, inputs, resumption, *lock));
-    const auto require_in_place = [lock, claim] {
+    const auto require_in_place = [lock, claim, folder] {
         lock->require_in_place();
         claim->held.require_in_place();
+        refuse_links(folder);
     };
     recorder.set_guard(require_in_place);
     remove_leftovers(folder, claim->held);
@@ -297,9 +313,9 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         if (!was_complete) recorder.write_manifest(false, seconds_since(begin));
         recorder.cut_tables();
     } else if (settings.branch) {
-        recorder.begin_branch(simulation, claim->replaced);
+        recorder.begin_branch(simulation, claim->held, claim->replaced);
     } else {
-        remove_files(claim->replaced);
+        claim->held.remove(claim->replaced);
         recorder.begin();
     }
     recorder.start_video(simulation, observer.stop);
@@ -324,7 +340,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         require_in_place();
         recorder.require_frames("was removed while the run was writing");
         recorder.write_manifest(true, seconds_since(begin));
-        if (!settings.checkpoint) remove_checkpoint(folder);
+        if (!settings.checkpoint) claim->held.remove({folder.checkpoint()});
     }
     RunReport report = report_of(recorder, settings, simulation);
     report.first_step = first_step;

@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/run_parts.h"
 
+#include <cerrno>
+#include <cstring>
 #include <optional>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 
 namespace nephos {
@@ -16,6 +22,11 @@ std::vector<std::filesystem::path> density_folders(const RunFolder& folder, cons
     for (const std::filesystem::path& file : density_files(folder, scene, kAnyFrame))
         folders.push_back(file.parent_path());
     return folders;
+}
+
+[[noreturn]] void throw_exchanged(const std::filesystem::path& folder) {
+    throw Error(ErrorCode::io,
+                folder.string() + ": the folder was removed or exchanged while the run was writing into it");
 }
 
 }  // namespace
@@ -66,10 +77,21 @@ void HeldFolders::hold_in_place(const std::vector<std::filesystem::path>& folder
 
 void HeldFolders::require_in_place() const {
     for (const auto& [folder, identity] : places_)
-        if (identity_behind(folder) != identity)
-            throw Error(
-                ErrorCode::io,
-                folder.string() + ": the folder was removed or exchanged while the run was writing into it");
+        if (identity_behind(folder) != identity) throw_exchanged(folder);
+}
+
+void HeldFolders::remove(const std::vector<std::filesystem::path>& files) const {
+    for (const std::filesystem::path& file : files) {
+        const std::filesystem::path path = file.has_parent_path() ? file.parent_path() : ".";
+        const Descriptor folder(::open(path.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+        struct stat status {};
+        if (folder.get() < 0 && errno == ENOENT) throw_exchanged(path);
+        if (folder.get() < 0 || ::fstat(folder.get(), &status) != 0)
+            throw Error(ErrorCode::io, file.string() + ": cannot remove: " + std::strerror(errno));
+        if (!known_.contains({status.st_dev, status.st_ino})) throw_exchanged(path);
+        if (::unlinkat(folder.get(), file.filename().c_str(), 0) != 0 && errno != ENOENT)
+            throw Error(ErrorCode::io, file.string() + ": cannot remove: " + std::strerror(errno));
+    }
 }
 
 bool HeldFolders::can_hold(const std::filesystem::path& folder) {

@@ -41,6 +41,9 @@ class HeldFolders {
     // Throws Error(io) where one of these is not there any more, or another folder or a link is in its place:
     // what is written would go where no lock is held. Thread-safe once all are held.
     void require_in_place() const;
+    // Removes files, in this order, from known folders: from the folder itself, whatever gets its path meanwhile. Throws Error(io), also
+    // where another folder is at the path.
+    void remove(const std::vector<std::filesystem::path>& files) const;
 
   private:
     std::map<FileIdentity, bool> known_;  // whether they are locked

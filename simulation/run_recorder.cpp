@@ -57,13 +57,13 @@ void RunRecorder::begin() {
     }
 }
 
-void RunRecorder::begin_branch(const Simulation& simulation,
+void RunRecorder::begin_branch(const Simulation& simulation, const HeldFolders& held,
                                const std::vector<std::filesystem::path>& replaced) {
-    require_tables_of_other_run(settings_, simulation.next_step());
-    remove_files(replaced);
+    std::vector<OtherTable> tables = tables_of_other_run(settings_, folder_, simulation.next_step());
+    held.remove(replaced);
     write_manifest(false, 0);
     const PublishCheck check(guard_);
-    copy_tables_of_other_run(settings_, folder_, simulation.next_step());
+    copy_rows(tables, simulation.next_step());
     statistics_ = StatisticsFile::resume(
         folder_.statistics(), simulation.next_step(),
         [this](std::uint64_t, std::string_view, const StateHash& hash) { state_.state_hash = hash.hex(); });
@@ -182,6 +182,7 @@ void RunRecorder::write_manifest(bool complete, double wall_s) {
 void RunRecorder::start_video(const Simulation& simulation, std::function<bool()> stop) {
     if (!settings_.render || !wants_video(settings_.scene)) return;
     std::error_code error;
+    if (guard_) guard_();
     if (simulation.next_frame() <= settings_.range.last_frame &&
         !std::filesystem::remove(folder_.video(), error) && error)
         throw Error(ErrorCode::io, folder_.video().string() + ": cannot remove: " + error.message());

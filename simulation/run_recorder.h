@@ -22,6 +22,8 @@
 
 namespace nephos {
 
+class HeldFolders;
+
 // Turns results into files: statistics and manifest here, those of frames beside the simulation.
 class RunRecorder : public SimulationSink {
   public:
@@ -49,7 +51,8 @@ class RunRecorder : public SimulationSink {
 
     // Goes on from the statistics of the run that this one branches off, with frames of its own, in the place of the files `replaced`. The manifest is there before
     // the first of them: without it they would be nobody's, should this fail.
-    void begin_branch(const Simulation& simulation, const std::vector<std::filesystem::path>& replaced);
+    void begin_branch(const Simulation& simulation, const HeldFolders& held,
+                      const std::vector<std::filesystem::path>& replaced);
 
     // Takes over what an earlier run reported up to where `simulation` goes on, and checks that it is all
     // there.

@@ -27,16 +27,6 @@ const Wind& wind_of_height(const Scene& scene, double height_m) {
 
 double height_of_level(const Placement& box, int k) { return box.origin_m.z + (k + 0.5) * box.cell_size_m; }
 
-// A profile between two key frames has the levels of both.
-std::vector<WindLevel> table_of(const Wind& wind, double time_s) {
-    std::set<double> heights;
-    for (const WindKeyframe& keyframe : wind.keyframes)
-        for (const WindLevel& level : keyframe.levels) heights.insert(level.height_m);
-    std::vector<WindLevel> levels;
-    for (const double height : heights) levels.push_back({height, wind_at(wind, height, time_s)});
-    return levels;
-}
-
 bool have_one_wind(const Scene& scene) {
     const Wind& first = common_wind(scene);
     for (std::size_t n = 0; n < scene.layers.size(); ++n)
@@ -72,8 +62,8 @@ std::vector<Velocity> wind_of_levels(const Scene& scene, std::optional<std::size
 
 std::vector<WindLevel> wind_levels(const Scene& scene, std::optional<std::size_t> layer, const Placement& box,
                                    Extent size, double time_s) {
-    if (layer) return table_of(layer_wind(scene, *layer), time_s);
-    if (have_one_wind(scene)) return table_of(common_wind(scene), time_s);
+    if (layer) return profile_at(layer_wind(scene, *layer), time_s);
+    if (have_one_wind(scene)) return profile_at(common_wind(scene), time_s);
     std::vector<WindLevel> levels;
     const std::vector<Velocity> velocities = wind_of_levels(scene, {}, box, size, time_s);
     for (int k = 0; k < size.z; ++k) levels.push_back({height_of_level(box, k), velocities[std::size_t(k)]});
@@ -85,10 +75,10 @@ Velocity wind_at_height(const Scene& scene, double height_m, double time_s) {
 }
 
 std::vector<WindLevel> wind_profile(const Scene& scene, double time_s) {
-    if (have_one_wind(scene)) return table_of(common_wind(scene), time_s);
+    if (have_one_wind(scene)) return profile_at(common_wind(scene), time_s);
     std::set<double> heights;
     const auto add = [&](const Wind& wind) {  // the levels that are of this wind
-        for (const WindLevel& level : table_of(wind, time_s))
+        for (const WindLevel& level : profile_at(wind, time_s))
             if (&wind_of_height(scene, level.height_m) == &wind) heights.insert(level.height_m);
     };
     add(common_wind(scene));

@@ -19,7 +19,7 @@
 namespace nephos {
 namespace {
 
-constexpr std::uint32_t kHistoryVersion = 5;
+constexpr std::uint32_t kHistoryVersion = 6;
 
 // The range of a simulation, in the order of a checkpoint.
 void put_range(ByteWriter& writer, const SimulationRange& range) {

@@ -53,6 +53,15 @@ std::optional<std::string> beginning_of(const std::filesystem::path& path, std::
     }
 }
 
+void require_saved(const std::filesystem::path& path, const FileDigest& found, const FileDigest& saved,
+                   std::string_view cure) {
+    if (found != saved)
+        throw Error(ErrorCode::io,
+                    fmt::format("{}: does not begin with the {} bytes that the run had written: it was "
+                                "changed, or is of another run{}",
+                                path.string(), saved.bytes, cure));
+}
+
 [[noreturn]] void fail(const std::filesystem::path& path, int error) {
     throw Error(ErrorCode::io, path.string() + ": cannot write: " + std::strerror(error));
 }
@@ -74,6 +83,14 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
                               const StatisticsVisitor& visit, std::string_view header,
                               std::string_view cure) {
     std::ifstream stream = open_stream(path);
+    return read_statistics(stream, path, steps, visit, header, cure);
+}
+
+std::uint64_t read_statistics(std::istream& stream, const std::filesystem::path& path, std::uint64_t steps,
+                              const StatisticsVisitor& visit, std::string_view header,
+                              std::string_view cure) {
+    stream.clear();
+    stream.seekg(0);
     std::string line;
     // A last line without its newline is one that was being written.
     const auto next_line = [&] { return std::getline(stream, line) && !stream.eof(); };
@@ -96,12 +113,11 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
 }
 
 void require_table_of_run(const std::filesystem::path& path, const FileDigest& saved, std::string_view cure) {
-    const FileDigest found = file_digest(path, saved.bytes);
-    if (found != saved)
-        throw Error(ErrorCode::io,
-                    fmt::format("{}: does not begin with the {} bytes that the run had written: it was "
-                                "changed, or is of another run{}",
-                                path.string(), saved.bytes, cure));
+    require_saved(path, file_digest(path, saved.bytes), saved, cure);
+}
+
+void require_table_of_run(std::istream& file, const std::filesystem::path& path, const FileDigest& saved) {
+    require_saved(path, file_digest(file, path, saved.bytes), saved, {});
 }
 
 bool is_statistics(const std::filesystem::path& path, std::string_view header) {

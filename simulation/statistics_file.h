@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <iosfwd>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -40,11 +41,16 @@ using StatisticsVisitor =
 std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
                               const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader,
                               std::string_view cure = {});
+// As that, from the beginning of a file that is open.
+std::uint64_t read_statistics(std::istream& file, const std::filesystem::path& path, std::uint64_t steps,
+                              const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader,
+                              std::string_view cure = {});
 
 // Throws Error(io) unless the file begins with the bytes that a run had written when it saved: otherwise it was edited, or is of
 // another run. The message ends with `cure`.
 void require_table_of_run(const std::filesystem::path& path, const FileDigest& saved,
                           std::string_view cure = {});
+void require_table_of_run(std::istream& file, const std::filesystem::path& path, const FileDigest& saved);
 
 // The cure where the run itself is called again.
 inline constexpr std::string_view kStartAnew = "; --overwrite instead of --resume starts the run anew";

@@ -111,15 +111,21 @@ void AutosaveFile::claim(const fs::path& folder, const std::string& name) {
 }
 
 void AutosaveFile::write(const fs::path& folder, const std::string& name, std::string_view text) {
-    if (!is_in_place()) claim(folder, name);
-    AtomicFile next(path_, Access::owner);
-    Descriptor file(::open(next.temporary().c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
-    if (file.get() < 0) fail(path_, "cannot be written", errno);
-    lock(file.get());  // before it gets the name: nobody sees it without
-    if (const int failed = write_all(file.get(), std::as_bytes(std::span(text))))
-        fail(path_, "cannot be written", failed);
-    next.publish();
-    file_ = std::move(file);
+    const bool is_new = !is_in_place();
+    if (is_new) claim(folder, name);
+    try {
+        AtomicFile next(path_, Access::owner);
+        Descriptor file(::open(next.temporary().c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
+        if (file.get() < 0) fail(path_, "cannot be written", errno);
+        lock(file.get());  // before it gets the name: nobody sees it without
+        if (const int failed = write_all(file.get(), std::as_bytes(std::span(text))))
+            fail(path_, "cannot be written", failed);
+        next.publish();
+        file_ = std::move(file);
+    } catch (const Error&) {
+        if (is_new) remove();  // it is empty
+        throw;
+    }
 }
 
 void AutosaveFile::adopt(const LeftAutosave& left) {
@@ -166,6 +172,13 @@ std::vector<LeftAutosave> left_autosaves(const fs::path& folder, const std::stri
         return a.time != b.time ? a.time > b.time : a.path < b.path;
     });
     return out;
+}
+
+std::string scene_of_autosave(const fs::path& file) {
+    const std::string name = file.filename().string();
+    const bool is_one = name.starts_with('.') && name.size() > kEnd.size() + 1 && name.ends_with(kEnd);
+    const std::string scene = is_one ? name.substr(1, name.size() - kEnd.size() - 1) : std::string();
+    return fs::path(scene).extension() == ".toml" ? scene : std::string();
 }
 
 void delete_autosave(const LeftAutosave& left) {

@@ -340,7 +340,7 @@ void do_pending(Editor& editor) {
         } else if (what == Pending::open && is_grid(editor.pending_path)) {
             offer_grid(editor, editor.pending_path);
         } else if (what == Pending::open) {
-            open(std::make_unique<SceneDocument>(editor.pending_path));
+            open(SceneDocument::opened(editor.pending_path, editor.folder));
         }
     });
 }

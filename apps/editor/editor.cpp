@@ -98,13 +98,15 @@ std::string autosave_all(Editor& editor) {
     return failures;
 }
 
-// Opens files that were dropped on the window, up to one about which something is asked: what is answered is of the scene
-// that is open.
+// Opens files that were dropped on the window, up to one that cannot be opened, or about which something is asked: what is
+// answered is of the scene that is open.
 void open_dropped(Editor& editor, const std::vector<std::filesystem::path>& paths) {
     for (const std::filesystem::path& path : paths) {
+        const std::string name = path.filename().string();
+        if (is_refusal_unseen(editor)) return say(editor, editor.message + "; not opened: " + name, true);
         if (is_asking(editor))
             return say(editor,
-                       "Not opened: " + path.filename().string() +
+                       "Not opened: " + name +
                            ". A question or a dialog waits for an answer: drop it once more behind that",
                        true);
         ask_before(editor, Pending::open, path);
@@ -307,25 +309,34 @@ int loop(Editor& editor, Report& report) {
 std::unique_ptr<SceneDocument> first_document(Editor& editor) {
     namespace fs = std::filesystem;
     if (editor.options.scene.empty()) return std::make_unique<SceneDocument>(first_scene_text());
-    if (!fs::is_directory(editor.options.scene)) return std::make_unique<SceneDocument>(editor.options.scene);
+    if (!fs::is_directory(editor.options.scene))
+        return SceneDocument::opened(editor.options.scene, editor.folder);
+    std::vector<fs::path> scenes, gone;  // of those that are gone edits may be left
     for (const auto& entry : fs::directory_iterator(editor.options.scene)) {
         // Not what other programs keep beside: locks of Emacs, attributes of macOS.
         const bool is_hidden = entry.path().filename().string().starts_with('.');
         std::error_code error;
         if (entry.path().extension() == ".toml" && !is_hidden && entry.is_regular_file(error))
-            editor.folder_scenes.push_back(entry.path());
+            scenes.push_back(entry.path());
+        const std::string scene = scene_of_autosave(entry.path().filename());
+        if (!scene.empty()) gone.push_back(editor.options.scene / scene);
     }
-    std::ranges::sort(editor.folder_scenes);
-    if (editor.folder_scenes.empty()) {
+    if (scenes.empty()) scenes = std::move(gone);
+    if (scenes.empty()) {
         throw Error(ErrorCode::usage, editor.options.scene.string() + ": no scene (*.toml) in this folder");
     }
-    return std::make_unique<SceneDocument>(editor.folder_scenes.front());
+    std::ranges::sort(scenes);
+    editor.folder_scenes = std::move(scenes);
+    return SceneDocument::opened(editor.folder_scenes.front(), editor.folder);
 }
 
 // Writes unsaved edits down before the program ends by an error; what to say about it.
 std::string kept_edits(Editor& editor) {
     bool any = false;
-    for_each_scene(editor, [&](const OpenScene& scene) { any |= scene.document->is_modified(); });
+    for_each_scene(editor, [&](const OpenScene& scene) {
+        scene.document->look_whether_gone();
+        any |= scene.document->is_modified();
+    });
     if (!any && !editor.typed && !editor.recorded_value) return {};
     const std::string failures = autosave_all(editor);
     if (!failures.empty()) return "; unsaved edits could not be kept: " + failures;

@@ -96,11 +96,20 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
     const Scene* const scene = editor.document->current_scene();
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || scene == nullptr) held.clear();
     if (scene == nullptr) return;
-    for (const KeyMark& mark : marks_of(*scene, editor.document->values())) {
+    const std::vector<KeyMark> marks = marks_of(*scene, editor.document->values());
+    const KeyMark* under_mouse =
+        nullptr;  // the nearest, and of those at one place the one that is drawn last
+    float nearest = hovered ? 1.6f * half : -1.0f;
+    for (const KeyMark& mark : marks) {
+        const float distance = std::abs(mouse.x - x_of(mark.time_s / step_s));
+        if (distance > nearest) continue;
+        under_mouse = &mark;
+        nearest = distance;
+    }
+    for (const KeyMark& mark : marks) {
         const double step = mark.time_s / step_s;
         const float x = x_of(step);
-        const bool near = hovered && std::abs(mouse.x - x) < 1.6f * half,
-                   chosen = editor.selected == mark.path;
+        const bool near = under_mouse == &mark, chosen = editor.selected == mark.path;
         const float size = chosen || near ? 1.3f * half : half;
         list.AddQuadFilled(ImVec2(x, middle - size), ImVec2(x + size, middle), ImVec2(x, middle + size),
                            ImVec2(x - size, middle), mark.colour);

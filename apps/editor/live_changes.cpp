@@ -28,18 +28,11 @@ std::string levels_toml(const std::vector<WindLevel>& levels) {
     return out + "]";
 }
 
-// The profile at a time, at the heights of all key frames around it.
-std::vector<WindLevel> profile_at(const Wind& wind, double time_s) {
-    std::vector<double> heights;
-    for (const WindKeyframe& key : wind.keyframes) {
-        for (const WindLevel& level : key.levels) heights.push_back(level.height_m);
-    }
-    if (heights.empty()) heights = {0};
-    std::ranges::sort(heights);
-    heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
-    std::vector<WindLevel> out;
-    for (const double height : heights) out.push_back({height, wind_at(wind, height, time_s)});
-    return out;
+// A key frame needs a level, also where no wind is.
+std::vector<WindLevel> levels_at(const Wind& wind, double time_s) {
+    std::vector<WindLevel> levels = profile_at(wind, time_s);
+    if (levels.empty()) levels.push_back({});
+    return levels;
 }
 
 std::vector<KeyFrame> key_frames(const std::vector<WindKeyframe>& keys) {
@@ -62,10 +55,10 @@ std::vector<WindKeyframe> changed_keys(const Wind& before, const std::vector<Win
         const double from = keys.back().time_s;
         for (std::uint64_t at = std::uint64_t(std::max(0.0, std::ceil(from / step_s))); at < step; ++at) {
             const double time = double(at) * step_s;
-            if (time > from) keys.push_back({time, profile_at(before, time)});
+            if (time > from) keys.push_back({time, levels_at(before, time)});
         }
     } else if (step > 0 && (keys.empty() || keys.back().time_s < last)) {
-        keys.push_back({last, profile_at(before, last)});
+        keys.push_back({last, levels_at(before, last)});
     }
     keys.push_back({now, after});
     return keys;

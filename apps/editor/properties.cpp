@@ -155,12 +155,13 @@ void value_row(Editor& editor, const ValueRow& row) {
     ImGui::PopID();
 }
 
+std::string lower(std::string text) {
+    std::ranges::transform(text, text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    return text;
+}
+
 bool matches(const std::string& filter, const ValueRow& row) {
     if (filter.empty()) return true;
-    const auto lower = [](std::string text) {
-        std::ranges::transform(text, text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-        return text;
-    };
     const std::string wanted = lower(filter);
     return lower(path_text(row.path)).find(wanted) != std::string::npos ||
            lower(readable_name(row.key)).find(wanted) != std::string::npos;
@@ -251,6 +252,13 @@ void section_rows(Editor& editor, const Section& section, const TextPath& path) 
     }
 }
 
+// Returns true when a search names an element by its number, or a key of it: "wind[55]", "wind[55].time_s".
+bool is_asked_for(const TextPath& element, const std::string& filter) {
+    if (filter.find('[') == std::string::npos) return false;
+    const std::string name = lower(path_text(element)), wanted = lower(filter);
+    return name.find(wanted) != std::string::npos || wanted.find(name) != std::string::npos;
+}
+
 // All keys of the scene whose names match. Returns whether there were any.
 bool found_rows(Editor& editor, const Section& section, const TextPath& path) {
     constexpr std::size_t kMostShown = 50;  // of a list
@@ -272,14 +280,18 @@ bool found_rows(Editor& editor, const Section& section, const TextPath& path) {
             return array != nullptr ? array->items.size() : 0;
         };
         bool any_of_list = false;
-        for (std::size_t n = 0; n < std::min(size(), kMostShown); ++n) {
+        std::size_t shown = std::min(size(), kMostShown);
+        for (std::size_t n = 0; n < size(); ++n) {
             TextPath element = at;
             element.push_back({{}, n});
+            if (n >= kMostShown && !is_asked_for(element, editor.filter)) continue;
+            if (n >= kMostShown && ++shown > 2 * kMostShown) break;
             any_of_list |= found_rows(editor, *key.section, element);
         }
         any |= any_of_list;
-        if (!any_of_list || size() <= kMostShown) continue;
-        ImGui::TextDisabled("%s: %zu more, in the outline", path_text(at).c_str(), size() - kMostShown);
+        shown = std::min(shown, 2 * kMostShown);
+        if (!any_of_list || size() <= shown) continue;
+        ImGui::TextDisabled("%s: %zu more, in the outline", path_text(at).c_str(), size() - shown);
         editor.controls.note("more of " + path_text(at));
     }
     return any;
@@ -315,9 +327,11 @@ std::string text_with_typed(const Editor& editor) {
     try {
         const Node& values = editor.document->values();
         if (const auto& recorded = editor.recorded_value) {
-            const TextPath path = recorded_place(editor, recorded->path).value_or(recorded->path);
+            const std::optional<TextPath> place = recorded_place(editor, recorded->path);
+            const TextPath path = place.value_or(recorded->path);
             const std::string edited =
                 with_value_of_wind(text, values, path, recorded->value, recorded->form);
+            if (!place) return edited;  // it would be refused, and is kept where it was typed
             try {
                 return with_recorded(editor, path, edited);
             } catch (const Error&) {  // it is kept as it would be without recording

@@ -50,7 +50,9 @@ void unsaved_dialog(Editor& editor) {
     if (!ImGui::BeginPopupModal(kTitle, nullptr,
                                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
         return;
-    ImGui::Text("%s has edits that are not saved.", editor.document->title().c_str());
+    const bool is_gone = editor.document->text() == editor.document->saved_text();
+    ImGui::Text(is_gone ? "The file of %s is gone from the disk." : "%s has edits that are not saved.",
+                editor.document->title().c_str());
     editor.controls.note("unsaved " + editor.document->title());
     ImGui::Spacing();
     if (button(editor, "Save them")) {
@@ -111,7 +113,8 @@ void recovery_dialog(Editor& editor) {
                                : "In place of what the file has; undo goes back to that");
         ImGui::SameLine();
     }
-    if (button(editor, "Keep them in a file", "As a scene beside this one, to look at later")) {
+    const std::string there = "As a scene in " + found.path.parent_path().string() + ", to look at later";
+    if (button(editor, "Keep them in a file", there.c_str())) {
         attempt(editor, [&] { say(editor, "Kept as " + keep_autosave(found, title).string()); });
         answered = true;
     }

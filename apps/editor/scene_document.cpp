@@ -26,14 +26,25 @@ std::optional<FileStamp> stamp_of(const fs::path& path) {
     return stamp == FileStamp{} ? std::nullopt : std::optional(stamp);
 }
 
-// Returns the name of the edits of a scene that are kept in another folder: with the path of its own, or its checksum
-// where that is too long for a name.
+// Returns the name of the edits of a scene that are kept in another folder: with the path of its own, where links lead, or
+// its checksum where that is too long for a name. No two folders have the same.
 std::string name_elsewhere(const fs::path& folder, const std::string& name) {
     constexpr std::size_t kLongest = 128;
-    std::string path = normal_path(fs::absolute(folder)).string();
-    if (path.size() > kLongest) path = "%" + digest_of(std::as_bytes(std::span(path)));
-    std::ranges::replace(path, '/', '%');
-    return path + "%" + name;
+    std::error_code error;
+    const fs::path absolute = fs::absolute(folder, error);
+    fs::path path = fs::weakly_canonical(absolute, error);
+    if (error) path = normal_path(absolute);
+    std::string coded;
+    for (const char letter : path.string()) {
+        if (letter == '/')
+            coded += "%2F";
+        else if (letter == '%')
+            coded += "%25";
+        else
+            coded += letter;
+    }
+    if (coded.size() > kLongest) coded = "%" + digest_of(std::as_bytes(std::span(coded)));
+    return coded + "%%" + name;
 }
 
 }  // namespace
@@ -51,6 +62,19 @@ SceneDocument::SceneDocument(const fs::path& path) : path_(path), has_file_(true
     file_stamp_ = now.stamp;
     history_.push_back({saved_text_, "Open"});
     read();
+}
+
+std::unique_ptr<SceneDocument> SceneDocument::opened(const fs::path& path, const fs::path& folder) {
+    try {
+        return std::make_unique<SceneDocument>(path);
+    } catch (const Error&) {
+        std::error_code error;
+        if (fs::symlink_status(path, error).type() != fs::file_type::not_found) throw;
+        auto gone = std::make_unique<SceneDocument>(std::string(), path.string());
+        gone->has_file_ = gone->is_gone_ = true;
+        if (gone->left_autosaves(folder).empty()) throw;
+        return gone;
+    }
 }
 
 void SceneDocument::read() {
@@ -205,6 +229,10 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
     return Disk::reloaded;
 }
 
+void SceneDocument::look_whether_gone() {
+    if (has_file_) is_gone_ = !stamp_of(path_);
+}
+
 void SceneDocument::reload() {
     FileText now = read_file(path_);
     const bool is_same = now.text == text();
@@ -225,6 +253,7 @@ fs::path SceneDocument::autosave_folder(const fs::path& folder) const {
 }
 
 void SceneDocument::autosave(const fs::path& folder, const std::string& now) {
+    look_whether_gone();
     if (now == saved_text_ && !is_gone_) return remove_autosave();
     if (now == autosaved_text_ && autosave_.is_in_place()) return;
     const fs::path beside = autosave_folder(folder);
@@ -233,11 +262,14 @@ void SceneDocument::autosave(const fs::path& folder, const std::string& now) {
         autosave_.write(beside, title(), now);
     } catch (const Error&) {
         if (beside == folder) throw;
-        // One cannot write beside it, as beside a scene that is installed.
+        // One cannot write beside it, as beside a scene that is installed or on a full disk.
         bool is_kept = false;
         try {
             create_folders(folder);
-            autosave_.write(folder, name_elsewhere(beside, title()), now);
+            AutosaveFile elsewhere;
+            elsewhere.write(folder, name_elsewhere(beside, title()), now);
+            autosave_.remove();  // of earlier edits
+            autosave_ = std::move(elsewhere);
             is_kept = true;
         } catch (const Error&) {  // the first one says more
         }

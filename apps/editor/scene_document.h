@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,6 +31,9 @@ class SceneDocument {
                            std::filesystem::path folder = {});
     // Throws Error(io) when the file cannot be read; a file with problems is opened all the same.
     explicit SceneDocument(const std::filesystem::path& path);
+    // As that; a file that is gone is one without text when there are left_autosaves() of it in `folder` or beside it.
+    static std::unique_ptr<SceneDocument> opened(const std::filesystem::path& path,
+                                                 const std::filesystem::path& folder);
 
     const std::string& text() const { return history_[at_].text; }
     // As it was opened or saved last.
@@ -81,11 +85,13 @@ class SceneDocument {
     enum class Disk { same, reloaded, differs, gone };
     // Reads a file that changed, unless there are unsaved edits (`differs`). The old text can be had again by undo.
     Disk look_at_disk();
+    // Only whether it is gone; reads nothing, and so changes no text.
+    void look_whether_gone();
     void reload();
 
-    // Writes unsaved edits into a file beside the scene's (autosave.h), in `folder` for one that has none; removes that
-    // file when there are none. Files that are there already stay as they are. `now`: the text, or what it is about to become.
-    // Throws Error(io).
+    // Writes unsaved edits into a file beside the scene's (autosave.h), in `folder` for one that has none or where one cannot
+    // write there; removes that file when there are none. Files that are there already stay as they are. `now`: the text, or what
+    // it is about to become. Looks whether the file is gone. Throws Error(io).
     void autosave(const std::filesystem::path& folder, const std::string& now);
     void autosave(const std::filesystem::path& folder) { autosave(folder, text()); }
     void remove_autosave() { autosave_.remove(); }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <utility>
 
 #include "core/error.h"
@@ -219,14 +220,22 @@ double step_of(const Key& key) {
 
 std::optional<TextEntry> place_of_copy(const Key& tables, const Node& array, std::size_t index) {
     for (const Key& key : tables.section->keys) {
-        const bool rises = key.name == "time_s" ? tables.name != "lightning"
-                                                : tables.name == "levels" && key.name == "height_m";
+        const bool rises = (key.name == "time_s" && tables.name != "lightning") ||
+                           (key.name == "height_m" && tables.name == "levels") ||
+                           (key.name == "state" && tables.name == "presence");
         if (!rises) continue;
         const double here = number_in(array.items.at(index), key.name);
         const double next = index + 1 < array.items.size()
                                 ? number_in(array.items[index + 1], key.name)
                                 : std::min(here + 2 * step_of(key), key.limits.max);
-        return TextEntry{key.name, number_text(here + 0.5 * (next - here), 9)};
+        const double middle = here + 0.5 * (next - here);
+        if (!(here < middle && middle < next))
+            throw Error(ErrorCode::usage,
+                        "Not copied: no " + std::string(key.name) + " is left behind " + number_text(here));
+        const std::string text = number_text(middle, 9);
+        double rounded = middle;
+        std::from_chars(text.data(), text.data() + text.size(), rounded);
+        return TextEntry{key.name, here < rounded && rounded < next ? text : number_text(middle)};
     }
     return std::nullopt;
 }

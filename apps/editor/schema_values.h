@@ -48,7 +48,7 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
                                    const Scene* scene, const Vec3& centre_m);
 
 // Returns where a copy of an element stands that is put behind it, in an array whose elements rise in time or height: in the
-// middle to the next. Nothing for other arrays.
+// middle to the next. Nothing for other arrays. Throws Error(usage) where there is no room.
 std::optional<TextEntry> place_of_copy(const Key& tables, const Node& array, std::size_t index);
 
 // Returns a name that no element has: "cloud 2".

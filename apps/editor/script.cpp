@@ -102,6 +102,7 @@ Script::Script(const std::filesystem::path& path) : path_(path) {
     for (std::string text; std::getline(file, text);) {
         ++number;
         std::istringstream in(text);
+        if ((in >> std::ws).peek() == '#') continue;
         Line line{number, {}};
         while (!(in >> std::ws).eof()) {
             std::string word;
@@ -110,7 +111,7 @@ Script::Script(const std::filesystem::path& path) : path_(path) {
                                                   "' has a quotation mark that is not closed");
             line.words.push_back(word);
         }
-        if (line.words.empty() || line.words.front().starts_with('#')) continue;
+        if (line.words.empty()) continue;
         const auto known = commands().find(line.words.front());
         if (known == commands().end() || int(line.words.size()) - 1 < known->second) {
             throw Error(ErrorCode::usage, path.string() + ":" + std::to_string(number) + ": '" + text +

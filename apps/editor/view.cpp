@@ -206,8 +206,10 @@ void take_scene_camera(Editor& editor) {
 
 void keep_camera(Editor& editor) {
     const Scene* const scene = editor.document->current_scene();
+    if (scene == nullptr)
+        return say(editor, "The camera is not kept while the text has problems: mend them, or undo", true);
     const Camera& camera = editor.camera.camera;
-    const Camera before = scene != nullptr ? scene->render.camera : Camera{};
+    const Camera before = scene->render.camera;
     const double time_s = editor.picture ? editor.picture->time_s : 0;
     if (!before.path.empty() && before.above_ground)
         return say(editor,

@@ -36,7 +36,7 @@ struct SweepArguments {
     std::optional<Design> design;
     std::optional<std::uint64_t> points, replicates, seed;
     bool common_seeds = false, dry_run = false, status = false, retry_failed = false, fail_fast = false,
-         overwrite = false, tracks = false;
+         allow_failures = false, overwrite = false, tracks = false;
     std::optional<std::pair<std::uint64_t, std::uint64_t>> steps;
     std::optional<StopAt> until;
     std::optional<std::uint64_t> clouds_every;
@@ -230,11 +230,12 @@ int sweep(const SweepArguments& a) {
     if (a.emit && a.shards > 1)
         throw Error(ErrorCode::usage,
                     "--emit writes all shards: leave out --shard, and give their number as --tasks");
-    if (a.emit && (a.retry_failed || a.fail_fast || a.overwrite || a.workers > 0 || a.work.json))
+    if (a.emit &&
+        (a.retry_failed || a.fail_fast || a.allow_failures || a.overwrite || a.workers > 0 || a.work.json))
         throw Error(
             ErrorCode::usage,
-            "--emit runs nothing: leave out --retry-failed, --fail-fast, --overwrite, --workers and --json, "
-            "and write those that are wanted into the script");
+            "--emit runs nothing: leave out --retry-failed, --fail-fast, --allow-failures, --overwrite, "
+            "--workers and --json, and write those that are wanted into the script");
     if (a.emit) {
         const std::string next = emit_sweep(plan, *a.emit, a.tasks, job.folder);
         if (!a.work.quiet) print_note(describe(plan));
@@ -264,6 +265,7 @@ int sweep(const SweepArguments& a) {
         return 128 + pending_signal();
     };
     if (pending_signal() != 0) return stopped();
+    print_failures(report, folder);  // whatever becomes of the tables
     if (job.shards == 1) {
         const FolderGuard guard(job.folder, [] { return pending_signal() != 0; });
         if (!guard.is_held()) return stopped();
@@ -283,9 +285,8 @@ int sweep(const SweepArguments& a) {
         output.line(fmt::format("shard {} of {} is done; when all are, `nephos merge {}` makes the tables",
                                 job.shard, job.shards, folder));
     }
-    print_failures(report, folder);
     if (!report.problems.empty()) return int(ErrorCode::io);
-    return report.progress.failed > 0 ? int(ErrorCode::check) : 0;
+    return report.progress.failed > 0 && !a.allow_failures ? int(ErrorCode::check) : 0;
 }
 
 struct MergeArguments {
@@ -401,6 +402,8 @@ void add_sweep_command(CLI::App& app, Action& action) {
     command->add_flag("--status", a->status, "Only print how many runs are done");
     command->add_flag("--retry-failed", a->retry_failed, "Run again what failed");
     command->add_flag("--fail-fast", a->fail_fast, "End at the first run that fails");
+    command->add_flag("--allow-failures", a->allow_failures,
+                      "Runs that fail are no failure of the sweep: status 0, and failures.csv has them");
     command->add_flag("--overwrite", a->overwrite,
                       "Throw the records in the folder away first, with --shard those of the shard");
     add_json(*command, a->work);

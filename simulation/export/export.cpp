@@ -7,6 +7,7 @@
 #include <iterator>
 #include <map>
 #include <memory>
+#include <span>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -187,6 +188,26 @@ class GridReader {
     std::size_t bytes_ = 0;
 };
 
+std::vector<std::string> frame_names(const ExportOptions& options,
+                                     const std::vector<ExportSequence>& sequences) {
+    std::vector<std::string> names;
+    for (const ExportSequence& s : sequences)
+        for (const SourceFrame& frame : s.frames)
+            for (const ExportFormat format : all_formats(options))
+                if (format != ExportFormat::usd) names.push_back(frame_name(s, frame.number, format));
+    return names;
+}
+
+// Writes and lists a file that is made of no density.
+void write_text_file(const std::filesystem::path& folder, ExportList& list, const std::string& name,
+                     std::span<const std::byte> content, std::vector<std::string>& notes) {
+    if (std::string note = list.note_on_change(name); !note.empty()) notes.push_back(std::move(note));
+    list.begin({name});
+    list.write(false);
+    write_atomically(folder / name, content);
+    list.add_written(list.written_file(name, {}, {}));
+}
+
 // The summaries of a run's layers, in all forms that are wanted.
 void write_weather(const ExportOptions& options, ExportList& list, std::vector<std::string>& notes) {
     const RunListing run = read_run(options.source);
@@ -197,8 +218,7 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
     std::ranges::move(limit_notes(options.weather, frames), std::back_inserter(notes));
     const auto write_file = [&](std::string_view extension, std::span<const std::byte> content) {
         const std::string name = run.scene.name + std::string(extension);
-        write_atomically(options.folder / name, content);
-        list.add_written(list.written_file(name, {}, {}));
+        write_text_file(options.folder, list, name, content, notes);
     };
     const auto write = [&](WeatherFormat format, std::span<const std::byte> content) {
         for (const NamedWeather& named : weather_formats())
@@ -255,8 +275,7 @@ void write_texts(const ExportOptions& options, const std::vector<ExportSequence>
                  std::vector<std::string>& notes) {
     if (!options.weather.empty()) write_weather(options, list, notes);
     const auto write = [&](const std::string& name, const std::string& text) {
-        write_atomically(options.folder / name, std::string_view(text));
-        list.add_written(list.written_file(name, {}, {}));
+        write_text_file(options.folder, list, name, std::as_bytes(std::span(text)), notes);
     };
     const std::vector<ExportFormat> formats = all_formats(options);
     for (std::size_t n = 0; n < sequences.size(); ++n) {
@@ -314,10 +333,11 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     refuse_own_folder(options, sequences);
     const FolderLock lock(options.folder, "export");
     ExportList list(options, sequences);
+    list.begin(frame_names(options, sequences));
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());
     const auto take = [&](const ExportSequence& s, std::vector<FrameFigures>& of, ExportedFrame&& frame) {
-        if (!frame.note.empty()) notes.push_back(std::move(frame.note));
+        std::ranges::move(frame.notes, std::back_inserter(notes));
         for (ExportedFrame::File& file : frame.files)
             file.kept ? list.add_kept(std::move(file.listed)) : list.add_written(std::move(file.listed));
         if (frame.figures.max > s.scale && cuts_values(options))

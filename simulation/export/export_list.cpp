@@ -148,6 +148,10 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     std::vector<ExportedFile> files;
     for (const CheckedJson& file : CheckedJson(json, path).at("files").items())
         files.push_back(file_of(file));
+    if (json.contains("begun"))
+        for (const CheckedJson& name : CheckedJson(json, path).at("begun").items())
+            begun_.insert(name.text());
+    json.erase("begun");
     json.erase("files");
     json.erase("complete");
     json.erase(kSealKey);
@@ -161,6 +165,18 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     }
 }
 
+void ExportList::begin(const std::vector<std::string>& names) {
+    for (const std::string& name : names) {
+        const std::filesystem::path path = folder_ / name;
+        if (!earlier_.contains(name) && !begun_.contains(name) && stands_there(path))
+            throw Error(ErrorCode::usage,
+                        path.string() +
+                            ": is there already, and no export has written it: move it away, or "
+                            "choose another folder");
+    }
+    begun_.insert(names.begin(), names.end());
+}
+
 std::optional<ExportedFile> ExportList::kept_file(const std::string& name, const ExportSource& source) const {
     const auto found = earlier_.find(name);
     std::error_code error;
@@ -170,6 +186,15 @@ std::optional<ExportedFile> ExportList::kept_file(const std::string& name, const
     ExportedFile file = found->second;
     file.source = below_folder(source.path);
     return file;
+}
+
+std::string ExportList::note_on_change(const std::string& name) const {
+    const auto found = earlier_.find(name);
+    std::error_code error;
+    const std::filesystem::path path = folder_ / name;
+    if (found == earlier_.end() || !std::filesystem::is_regular_file(path, error)) return {};
+    if (file_digest(path) == found->second.digest) return {};
+    return path.string() + ": was changed since an earlier export wrote it, and is made again";
 }
 
 ExportedFile ExportList::written_file(const std::string& name, const ExportSource& source,
@@ -215,6 +240,10 @@ void ExportList::write(bool complete) const {
     for (const auto& [path, file] : earlier_)
         if (!complete && !listed.contains(path)) add(file);
     json["files"] = std::move(files);
+    Json begun = Json::array();
+    for (const std::string& name : begun_)
+        if (!listed.contains(name) && !earlier_.contains(name)) begun.push_back(name);
+    if (!complete && !begun.empty()) json["begun"] = std::move(begun);
     write_atomically(folder_ / "export.json",
                      std::string_view(sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace))));
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -30,9 +31,15 @@ class ExportList {
     // holds an export with other options, or a file without a list; Error(io) when the list is damaged.
     ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
 
+    // Names files that are about to be written: from the next write() on they are known as those of this export, also should it be
+    // killed. Throws Error(usage) where one is there that no export has listed or named.
+    void begin(const std::vector<std::string>& names);
     // Returns the entry of a file that is there as it was listed, and was made of this source: it need not be written
     // again. Thread-safe.
     std::optional<ExportedFile> kept_file(const std::string& name, const ExportSource& source) const;
+    // Returns what is to be told of a listed file that somebody changed, and that is about to be made again; empty: nothing.
+    // Thread-safe.
+    std::string note_on_change(const std::string& name) const;
     // Returns the entry of a file that was written, with its checksum. Thread-safe. Throws Error(io).
     ExportedFile written_file(const std::string& name, const ExportSource& source, std::string_view format) const;
     // List a file; those of frames in their order.
@@ -55,6 +62,7 @@ class ExportList {
     std::filesystem::path folder_;
     std::string head_;  // JSON of all but the files
     std::map<std::string, ExportedFile> earlier_;
+    std::set<std::string> begun_;
     std::vector<ExportedFile> files_;
     std::size_t written_ = 0, kept_ = 0;
 };

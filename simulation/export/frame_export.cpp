@@ -132,13 +132,12 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
     require_halves(options_, s, frame, loaded.density.max_value());
     const ExportSource source{frame.file, file_digest(frame.file)};
     require_unchanged(frame);
-    std::map<VoxelType, EncodedVolume> encoded;
-    std::vector<Volume> levels;
+    Encodings made;
     ExportedFrame result{{loaded.density.sum(), double(loaded.density.max_value())}, {}, {}};
     if (frame.listed && frame.listed != source.digest)
-        result.note = frame.file.string() +
-                      ": is damaged or was changed: it is not the file that the manifest of its run "
-                      "lists (nephos verify compares all of them)";
+        result.notes.push_back(frame.file.string() +
+                               ": is damaged or was changed: it is not the file that the manifest of its run "
+                               "lists (nephos verify compares all of them)");
     for (const ExportFormat format : all_formats(options_)) {
         if (format == ExportFormat::usd) continue;
         const std::string name = frame_name(s, frame.number, format);
@@ -146,32 +145,9 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
             result.files.push_back({std::move(*kept), true});
             continue;
         }
-        const std::filesystem::path path = options_.folder / name;
-        if (format == ExportFormat::vdb && is_copy(options_, s, frame, source)) {
-            copy_atomically(frame.file, path);
-        } else if (format == ExportFormat::vdb) {
-            write_vdb_file(path, options_, s, loaded, frame.time_s);
-        } else if (format == ExportFormat::flightgear) {
-            VolumeLayout layout;
-            layout.factor = s.layout.factor;
-            write_cloud_picture(path,
-                                largest_cloud(lay_out(loaded.density, layout), s.layout.periodic, s.scale),
-                                billows_of(s.genus));
-        } else if (format == ExportFormat::nvdb) {
-            write_nanovdb(path, grid_of(loaded.density, s.layout.factor),
-                          options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
-        } else {
-            if (levels.empty()) levels = levels_of(loaded.density, s);
-            const VoxelType type = type_of(options_, format);
-            if (format == ExportFormat::bricks) {
-                write_bricks(path, levels, brick_options(options_, s, type));
-            } else {
-                auto found = encoded.find(type);
-                if (found == encoded.end())
-                    found = encoded.emplace(type, encoded_levels(levels, type, s.scale)).first;
-                write_dense(path, format, s, frame, found->second);
-            }
-        }
+        if (std::string note = list_.note_on_change(name); !note.empty())
+            result.notes.push_back(std::move(note));
+        write_format(options_.folder / name, format, s, frame, loaded, source, made);
         ExportedFile file = list_.written_file(name, source, name_of(format));
         if (format == ExportFormat::vdb && is_copy(options_, s, frame, source) &&
             !(file.digest == source.digest))
@@ -180,6 +156,33 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
         result.files.push_back({std::move(file), false});
     }
     return result;
+}
+
+void FrameExporter::write_format(const std::filesystem::path& path, ExportFormat format,
+                                 const ExportSequence& s, const SourceFrame& frame,
+                                 const LoadedDensity& loaded, const ExportSource& source,
+                                 Encodings& made) const {
+    if (format == ExportFormat::vdb && is_copy(options_, s, frame, source))
+        return copy_atomically(frame.file, path);
+    if (format == ExportFormat::vdb) return write_vdb_file(path, options_, s, loaded, frame.time_s);
+    if (format == ExportFormat::flightgear) {
+        VolumeLayout layout;
+        layout.factor = s.layout.factor;
+        return write_cloud_picture(path,
+                                   largest_cloud(lay_out(loaded.density, layout), s.layout.periodic, s.scale),
+                                   billows_of(s.genus));
+    }
+    if (format == ExportFormat::nvdb)
+        return write_nanovdb(path, grid_of(loaded.density, s.layout.factor),
+                             options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
+    if (made.levels.empty()) made.levels = levels_of(loaded.density, s);
+    const VoxelType type = type_of(options_, format);
+    if (format == ExportFormat::bricks)
+        return write_bricks(path, made.levels, brick_options(options_, s, type));
+    auto found = made.encoded.find(type);
+    if (found == made.encoded.end())
+        found = made.encoded.emplace(type, encoded_levels(made.levels, type, s.scale)).first;
+    write_dense(path, format, s, frame, found->second);
 }
 
 void FrameExporter::write_dense(const std::filesystem::path& path, ExportFormat format,

@@ -5,8 +5,11 @@
 
 #include <deque>
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <future>
+#include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -24,7 +27,7 @@ struct ExportedFrame {
         bool kept;  // an earlier export wrote it
     };
     std::vector<File> files;  // in the order of formats
-    std::string note;  // on its source; empty: none
+    std::vector<std::string> notes;  // on its source, and on what was in the place of its files
 };
 
 // Writes the files of one frame that are not there yet. Thread-safe for different frames.
@@ -36,6 +39,15 @@ class FrameExporter {
     ExportedFrame write(const ExportSequence& s, const SourceFrame& frame, const LoadedDensity& loaded) const;
 
   private:
+    // What formats of a frame share, made when one needs it.
+    struct Encodings {
+        std::vector<Volume> levels;
+        std::map<VoxelType, EncodedVolume> encoded;
+    };
+
+    void write_format(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,
+                      const SourceFrame& frame, const LoadedDensity& loaded, const ExportSource& source,
+                      Encodings& made) const;
     void write_dense(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,
                      const SourceFrame& frame, const EncodedVolume& encoded) const;
 

@@ -26,6 +26,40 @@ TEST(Wind, IsPiecewiseLinearInHeightAndTime) {
     EXPECT_EQ(wind_at({}, 300, 0), (Velocity{0, 0}));
 }
 
+// What the editor records: the profile of a moment, written down as a keyframe there, is the wind that was.
+TEST(Wind, IsTheSameWithItsProfileAsAKeyframe) {
+    std::mt19937_64 random(7);
+    const auto number = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    const auto levels = [&] {
+        std::vector<WindLevel> out;
+        double height = number(-100, 500);
+        for (auto n = 1 + random() % 4; n > 0; --n, height += number(0.1, 900))
+            out.push_back({height, {number(-30, 30), number(-30, 30)}});
+        return out;
+    };
+    for (int n = 0; n < 3000; ++n) {
+        const Wind wind{
+            {{number(0, 10), levels()}, {number(20, 99), levels()}, {number(100, 999), levels()}}};
+        const WindKeyframe& first = wind.keyframes[0];
+        const WindKeyframe& second = wind.keyframes[1];
+        const double now = n % 7 == 0 ? second.time_s : number(first.time_s, second.time_s);
+        const std::vector<WindLevel> profile = profile_at(wind, now);
+        const Wind recorded{{first, {now, profile}, {now + 1, levels()}}};
+        for (int k = 0; k < 40; ++k) {
+            const double height =
+                k < int(profile.size()) ? profile[std::size_t(k)].height_m : number(-500, 4000);
+            const Velocity wanted = wind_at(wind, height, now);
+            ASSERT_EQ(wanted, wind_at(recorded, height, now)) << n << ": " << height << " m, " << now << " s";
+            const Velocity from = wind_at({{first}}, height, 0), to = wind_at({{second}}, height, 0);
+            const double passed = (now - first.time_s) / (second.time_s - first.time_s);
+            ASSERT_NEAR(wanted.east_m_per_s,
+                        from.east_m_per_s + (to.east_m_per_s - from.east_m_per_s) * passed, 1e-9);
+        }
+    }
+}
+
 TEST(Wind, RefusesWhatNoLatticeCanHold) {
     EXPECT_THROW(displacement_of_step({1e15, 0}, 1, 1), Error);
     EXPECT_THROW(displacement_of_step({std::nan(""), 0}, 1, 1), Error);

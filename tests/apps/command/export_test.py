@@ -399,6 +399,19 @@ class Export(Case):
         (folder / "placed_0004.raw").unlink()
         self.call("verify", "out")
 
+    def test_files_that_no_export_has_written_stay(self):
+        """Under the name of a further frame; one that was changed is made again, and that is said."""
+        folder = self.export("out", "--to", "raw", "--frames", "1..2")
+        (folder / "placed_0003.raw").write_bytes(b"mine")
+        (folder / "placed_0002.raw").write_bytes(b"edited")
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0003.raw: is there already, and no export has written it")
+        self.assertEqual([(folder / f"placed_000{n}.raw").read_bytes() for n in (2, 3)], [b"edited", b"mine"])
+        (folder / "placed_0003.raw").unlink()
+        said = self.call("export", "run", "--to", "raw", "-o", "out").stderr
+        self.assertIn("placed_0002.raw: was changed since an earlier export wrote it, and is made again", said)
+        self.call("verify", "out")
+        self.assertNotIn("begun", json.loads((folder / "export.json").read_text()))
+
     def test_sequences_are_numbered_from_0(self):
         """As most programs number them."""
         for number in range(3):

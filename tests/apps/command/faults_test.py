@@ -314,6 +314,74 @@ class Faults(Case):
                      says="statistics.csv: is a link, which is not followed here")
         self.assertEqual(other.read_bytes(), before)
 
+    def stopped_at(self, call, path, meanwhile, *arguments):
+        """Stops a command before such a call, does something, and lets it go on. Returns its status and what it said; none where it
+        made no such call."""
+        process = subprocess.Popen([NEPHOS, *map(str, arguments)], cwd=self.folder, stderr=subprocess.PIPE, text=True, env=self.failing(call, path))
+        try:
+            _, status = os.waitpid(process.pid, os.WUNTRACED)
+            if not os.WIFSTOPPED(status):
+                return None
+            meanwhile()
+            process.send_signal(signal.SIGCONT)
+            said = process.communicate(timeout=60)[1]
+            return process.returncode, said
+        finally:
+            process.kill()
+            process.stderr.close()
+
+    def test_a_branch_has_the_state_and_the_rows_of_one_run(self):
+        """Whenever another run gets the place of the one that it branches off."""
+        self.call("run", self.scene, "--no-render", "--out", "a")
+        self.call("run", self.scene, "--no-render", "--seed", "8", "--out", "b")
+        branch = ["run", "--no-render", "-q", "--set", "time.steps=30", "--from"]
+        self.call(*branch, "a", "--out", "twin")
+        def exchange():
+            shutil.rmtree(self.folder / "parent")
+            shutil.copytree(self.folder / "b", self.folder / "parent")
+        statuses = []
+        for path in ("parent/statistics.csv", "parent/manifest.json", "parent/checkpoint.nephos"):
+            for number in range(1, 9):
+                shutil.rmtree(self.folder / "parent", ignore_errors=True)
+                shutil.rmtree(self.folder / "out", ignore_errors=True)
+                shutil.copytree(self.folder / "a", self.folder / "parent")
+                ended = self.stopped_at(f"open STOP {number} 1", path, exchange, *branch, "parent", "--out", "out")
+                if ended is None:
+                    break
+                self.assertIn(ended[0], (0, 2, 3), ended[1])
+                statuses.append(ended[0])
+                if ended[0] == 0:
+                    rows = (self.folder / "out/statistics.csv").read_bytes()
+                    other = (self.folder / "b/statistics.csv").read_bytes()
+                    if rows[:len(other)] != other:  # else it branched off that one from the start
+                        self.assertEqual(rows, (self.folder / "twin/statistics.csv").read_bytes(), (path, number))
+                    else:
+                        self.call("verify", "out", "--replay", 2)
+        self.assertIn(3, statuses)
+
+    def test_a_folder_that_is_exchanged_while_a_run_begins(self):
+        """A run that is made again behind a link: that leads to another run before what is replaced is removed."""
+        self.call("run", self.scene, "--no-render", "--out", "a")
+        self.call("run", self.scene, "--no-render", "--seed", "8", "--out", "b")
+        before = {path: path.read_bytes() for path in (self.folder / "b").rglob("*") if path.is_file()}
+        link = self.folder / "latest"
+        def lead_to(name):
+            (self.folder / "new").symlink_to(name)
+            (self.folder / "new").rename(link)
+        stops = 0
+        for call in ("stat", "open"):
+            for number in range(1, 1000, 3):
+                lead_to("a")
+                ended = self.stopped_at(f"{call} STOP {number} 1", "latest", lambda: lead_to("b"), "run", self.scene, "--no-render", "-q", "--out", "latest")
+                self.assertEqual({path: path.read_bytes() for path in (self.folder / "b").rglob("*") if path.is_file()}, before, (call, number, ended))
+                if ended is None:
+                    break
+                self.assertIn(ended[0], (0, 2, 3), (call, number, ended[1]))
+                stops += 1
+                shutil.rmtree(self.folder / "a")
+                self.call("run", self.scene, "--no-render", "--out", "a")
+        self.assertGreater(stops, 10)
+
     def test_parts_that_are_removed_are_missed_at_the_end(self):
         for name in ("density/long_0002.vdb", "statistics.csv"):
             process = self.started("out")

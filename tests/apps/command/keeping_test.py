@@ -505,6 +505,35 @@ class Keeping(Case):
             self.assertEqual(self.files("a"), before)
             shutil.rmtree(self.folder / "b")
 
+    def test_a_link_that_is_put_in_place_of_the_manifest_ends_the_run(self):
+        """While the run is at work: the file of another run that it leads to is not replaced."""
+        self.call(*self.plain, "--seed", "8", "--out", "done")
+        before = self.files("done")
+        for name in ("manifest.json", "checkpoint.nephos"):
+            out = self.folder / f"out-{name}"
+            process = subprocess.Popen([NEPHOS, "run", self.scene, "--checkpoint-every", "0", "--set", "time.steps=20000", "--statistics-only", "--out", out, "-q"],
+                                       cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+            while process.poll() is None and not (out / "checkpoint.nephos").exists():
+                time.sleep(0.01)
+            (self.folder / "link").symlink_to(self.folder / "done" / name)
+            (self.folder / "link").rename(out / name)
+            _, said = process.communicate(timeout=60)
+            self.assertEqual(process.returncode, 3, said)
+            self.assertIn("is a link, which is not followed here" if (out / name).is_symlink() else "was removed or replaced", said)
+            self.assertEqual(self.files("done"), before)
+
+    def test_a_run_whose_tables_are_in_another_run_is_not_resumed(self):
+        """By a link of their folder: rows would be appended to that one's."""
+        scene = self.write("layered.toml", LAYERED)
+        self.call("run", scene, "--no-render", "--out", "a")
+        shutil.copytree(self.folder / "a", self.folder / "b")
+        shutil.rmtree(self.folder / "b/statistics")
+        (self.folder / "b/statistics").symlink_to("../a/statistics")
+        before = self.files("a")
+        resumed = self.call("run", scene, "--no-render", "--resume", "--set", "time.steps=90", "--out", "b", status=3)
+        self.assertIn("b/statistics: leads into another run", resumed.stderr)
+        self.assertEqual(self.files("a"), before)
+
     def test_a_folder_that_is_moved_away_does_not_come_back(self):
         for n in range(6):
             process = subprocess.Popen([NEPHOS, "run", self.scene, "--checkpoint-every", "0", "--set", "time.steps=20000", "--statistics-only", "--out", "out", "-q"],

@@ -317,7 +317,12 @@ class Branch(Case):
         (self.folder / "link").symlink_to("source/checkpoint.nephos")
         self.call(*branch, "link", "--out", "c")
         self.call(*branch, "source", "--out", "d")
-        self.assertEqual(*((self.folder / name / "statistics.csv").read_bytes() for name in "cd"))
+        # What is beside the link itself comes first: a run whose checkpoint alone is elsewhere.
+        shutil.copytree(self.folder / "source", self.folder / "apart")
+        (self.folder / "apart/checkpoint.nephos").unlink()
+        (self.folder / "apart/checkpoint.nephos").symlink_to("../alone/checkpoint.nephos")
+        self.call(*branch, "apart/checkpoint.nephos", "--out", "e")
+        self.assertEqual(len({(self.folder / name / "statistics.csv").read_bytes() for name in "cde"}), 1)
 
     def test_goes_on_without_the_other_run(self):
         self.begin()

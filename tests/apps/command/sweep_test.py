@@ -612,7 +612,7 @@ sd = 0.05
         self.refused(2, "sweep", self.null, "--seed", 2**63, *axis, "large", says="is not from 0 to 9223372036854775807")
         self.refused(2, "sweep", self.null, *axis, "both", "--emit", "slurm", "--shard", "0/2", says="leave out --shard")
         self.refused(2, "sweep", self.null, *axis, "tasks", "--tasks", "3", says="--emit")
-        for option in (["--retry-failed"], ["--fail-fast"], ["-j", "3"], ["--json"], ["--overwrite"]):
+        for option in (["--retry-failed"], ["--fail-fast"], ["--allow-failures"], ["-j", "3"], ["--json"], ["--overwrite"]):
             self.refused(2, "sweep", self.null, *axis, "tasks", "--emit", "slurm", *option, says="--emit runs nothing")
         # Beside records, too, whether complete or killed in the first runs.
         self.call("sweep", self.null, *axis, "mixed")

@@ -139,6 +139,26 @@ class Fields(Kept):
         low, _ = winds(typed(0, 0, 11) + "click find\nkey CTRL+A\ntype wind[\nwait 0.4\n" + typed(0, 0, 3, "time_s"))
         self.assertEqual(low[0][0], 3, low)
 
+    def test_winds_recorded_between_key_frames_are_replayed(self):
+        """Every step that was seen keeps its bits, those of clouds that are drawn directly between levels too."""
+        scene = self.folder / "w.toml"
+        def levels(low, high):
+            return "levels = [" + ", ".join("{{ height_m = {}, east_m_per_s = {}, north_m_per_s = {} }}".format(*level)
+                                            for level in ((100, *low), (1700, *high))) + "]\n"
+        scene.write_text('seed = 4\n[lattice]\ncells = [16, 16, 12]\n[time]\nstep_s = 7\nsteps = 60\n'
+                         '[[model]]\nname = "a"\nseeds = [{ position_m = [0, 0, 200], size_m = [300, 200, 150] }]\n'
+                         '[[sky]]\nname = "fair"\nstate = 0\nclouds = 5\nmodels = ["a"]\n'
+                         '[[layer]]\nname = "low"\nautomaton = false\nskies = ["fair"]\nbase_height_m = 750\nlattice = { cells = [16, 16, 8] }\n'
+                         f"[[layer.wind]]\ntime_s = 0\n{levels((7.7, 2.4), (2.6, -3.1))}"
+                         f"[[layer.wind]]\ntime_s = 399\n{levels((9.6, -0.2), (5.8, -2.3))}", encoding="utf-8")
+        self.edit(scene, script='wait-step 30\nkey SPACE\nwait 0.5\nclick "tab View"\nclick "Record as key frames"\nclick "tab Properties"\n'
+                                'click find\ntype east_m\nwait 0.4\ndouble-click-at layer[0].wind[0].levels[0].east_m_per_s 0.5 0.5\n'
+                                'key CTRL+A\ntype 11\nwait 0.2\nkey ENTER\nwait 0.5\nwait-picture\nhashes seen.txt\nkey CTRL+S\nwait 0.5\n')
+        seen = (self.folder / "seen.txt").read_text(encoding="utf-8").splitlines()
+        self.assertGreater(len(tomllib.loads(scene.read_text(encoding="utf-8"))["layer"][0]["wind"]), 30)
+        replay = subprocess.run([NEPHOS, "hash", scene, "--steps", str(len(seen) - 1)], capture_output=True, text=True, check=True)
+        self.assertEqual(replay.stdout.splitlines(), seen)
+
     def test_what_is_recorded_on_the_way_to_a_step_is_of_that_step(self):
         """While the simulation is made anew up to what the time line shows: the steps that were seen keep their wind."""
         scene = self.folder / "w.toml"

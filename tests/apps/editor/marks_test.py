@@ -80,6 +80,10 @@ class Marks(Kept):
             self.assertIn(frame, saved)
         above = PATH.replace("vertical_fov_deg = 50\n", "vertical_fov_deg = 50\nabove_ground = true\n")
         self.assertEqual(self.saved(above, 'click "tab View"\nclick "Keep it in the scene"\nwait 0.3\nexpect-control refusal\n'), above)
+        broken = self.folder / "broken.toml"
+        broken.write_text(PATH + "unknown = 1\n", encoding="utf-8")
+        self.edit(broken, script='wait 1\nclick "tab View"\nwait 0.3\nclick "Keep it in the scene"\nwait 0.3\nexpect-control refusal\nkey CTRL+S\nwait 0.5\n')
+        self.assertEqual(broken.read_text(encoding="utf-8"), PATH + "unknown = 1\n")
 
     def test_an_eye_keeps_its_height(self):
         text = PATH[:PATH.index("[[camera.path]]")] + "position_m = [0, -4000, 1.75]\ntarget_m = [0, 0, 1000]\n"
@@ -106,7 +110,21 @@ class Marks(Kept):
         frames = "".join(f"[[wind]]\ntime_s = {n}\nlevels = [{{ height_m = 1000, from_deg = 250, speed_m_per_s = 7 }}]\n" for n in range(60))
         scene = self.folder / "f.toml"
         scene.write_text(f'name = "w"\n[lattice]\ncells = [16, 16, 12]\n{frames}', encoding="utf-8")
-        self.edit(scene, script=self.START + 'click "tab Properties"\nwait 0.2\nset find wind\nwait 0.3\nexpect-control "more of wind"\n')
+        self.edit(scene, script=self.START + 'click "tab Properties"\nwait 0.2\nset find wind\nwait 0.3\nexpect-control "more of wind"\n'
+                                                 "set find wind[55]\nwait 0.3\nexpect-control wind[55].time_s\n"
+                                                 "set find wind[57].time\nwait 0.3\nexpect-control wind[57].time_s\n")
+
+    def test_of_two_marks_the_nearest_is_taken(self):
+        """Those of a recorded change stand a step apart; of two at one place the one that is seen."""
+        levels = "levels = [{ height_m = 1000, from_deg = 250, speed_m_per_s = 7.5 }]\n"
+        winds = "".join(f"[[wind]]\ntime_s = {time}\n{levels}" for time in (0, 690, 700))
+        two = f"seed = 4\n[lattice]\ncells = [16, 16, 12]\n{winds}" + "".join(
+            f"[[camera.path]]\ntime_s = {time}\nposition_m = [0, {-4000 - time}, 300]\ntarget_m = [0, 0, 1000]\n" for time in (0, 690))
+        for mark, key in (("wind[2]", "wind"), ("camera.path[1]", "camera")):
+            saved = tomllib.loads(self.saved(two, f'drag "key frame {mark}" 90 0\nwait 0.3\nclick "key frame {mark}"\nwait 0.3\nexpect-control {mark}.time_s\n'))
+            times = {"wind": [frame["time_s"] for frame in saved["wind"]], "camera": [frame["time_s"] for frame in saved["camera"]["path"]]}
+            self.assertGreater(times[key].pop(), 800, mark)
+            self.assertEqual(times["wind"][:2] + times["camera"][:1], [0, 690, 0])
 
 
 if __name__ == "__main__":

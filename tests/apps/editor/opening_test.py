@@ -3,6 +3,8 @@
 """What is opened in the place of another scene, or dropped on the window, and a file that is gone. See case.py."""
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -90,6 +92,55 @@ class Opening(Kept):
         """The answer about another scene says nothing of it."""
         self.removed_at('wait-step 1\nclick "new simulation"\nwait-step 1\nclick scene\nclick "tab Properties"\nset seed 9\nwait 0.3\nclick "simulation 1"\n'
                         'wait 0.3\nkey CTRL+Q\nwait 0.5\nhashes ready.txt\nwait 2\nclick "Discard them"\nwait 0.5\n')
+
+    def ended(self, scene, script, meanwhile=lambda: None, environment=None):
+        """Runs such a script, then ends the editor by SIGTERM; returns what it said."""
+        ready = self.folder / "ready.txt"
+        editor = subprocess.Popen(self.command(scene, script=script + "hashes ready.txt\nwait 100\n"), cwd=self.folder,
+                                  env={**self.environment, **(environment or {})}, stderr=subprocess.PIPE, text=True)
+        self.wait_for(ready, editor)
+        meanwhile()
+        editor.terminate()
+        said = editor.communicate(timeout=60)[1]
+        ready.unlink()
+        return said
+
+    TAKE = 'wait 1\nclick "Take them"\nwait 0.5\nkey CTRL+S\nwait 0.5\n'
+
+    def test_edits_are_kept_where_the_disk_is_full(self):
+        """In the folder of the settings; the next editor of the scene offers them, by whatever link it is reached."""
+        scene = self.folder / "full/a.toml"
+        scene.parent.mkdir()
+        scene.write_text(STATE, encoding="utf-8")
+        full = {"LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "write ENOSPC 1 1000000", "FAIL_PATH": "/full/", "FAIL_PROGRAM": "nephos-editor"}
+        said = self.ended(scene, 'wait-step 1\nclick scene\nclick "tab Properties"\nset seed 9\nwait 0.3\n', environment=full)
+        self.assertNotIn("could not be kept", said)
+        self.assertEqual([path.name for path in scene.parent.iterdir()], ["a.toml"])
+        (self.folder / "link").symlink_to("full")
+        self.edit(self.folder / "link/a.toml", script=self.TAKE)
+        self.assertEqual(scene.read_text(encoding="utf-8"), STATE.replace("4", "9"))
+
+    def test_a_hidden_scene_whose_file_is_gone_is_kept(self):
+        """And offered by the name of the file, which is not there; its folder may have been removed, too."""
+        for remove in (lambda scene: scene.unlink(), lambda scene: shutil.rmtree(scene.parent)):
+            scene = self.folder / "gone/a.toml"
+            scene.parent.mkdir(exist_ok=True)
+            scene.write_text(STATE, encoding="utf-8")
+            self.ended(scene, 'wait-step 1\nclick "new simulation"\nwait-step 1\n', meanwhile=lambda: remove(scene))
+            self.assertFalse(scene.exists())
+            is_folder_left = scene.parent.exists()
+            scene.parent.mkdir(exist_ok=True)
+            self.edit(scene.parent if is_folder_left else scene, script=self.TAKE)
+            self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
+            self.assertEqual([path.name for path in scene.parent.iterdir()], ["a.toml"])
+
+    def test_a_file_that_cannot_be_opened_ends_a_drop(self):
+        """Those behind it are not opened without a word."""
+        self.two(STATE, STATE)
+        self.edit(self.folder / "a.toml", script='wait-step 1\ndrop none.toml b.toml\nwait 0.5\nexpect-control refusal\nclick scene\n'
+                                                 'click "tab Properties"\nwait 1\nset seed 9\nwait 0.3\nkey CTRL+S\nwait 0.5\n')
+        self.assertEqual((self.folder / "b.toml").read_text(encoding="utf-8"), STATE)
+        self.assertEqual((self.folder / "a.toml").read_text(encoding="utf-8"), STATE.replace("4", "9"))
 
     def test_a_grid_has_the_scene_that_it_is_of(self):
         """Not the one that could not be simulated, whose text is in the window."""

@@ -360,6 +360,26 @@ TEST(SceneDocument, EditsOfASceneWhoseFolderCannotBeWrittenAreKeptElsewhere) {
     EXPECT_TRUE(SceneDocument(two / "a.toml").left_autosaves(settings).empty());
 }
 
+// Names of the folder of settings tell all folders of scenes from each other.
+TEST(SceneDocument, EditsKeptElsewhereAreOfOneFolder) {
+    const Folder folder;
+    const std::filesystem::path settings = folder.path / "settings", one = folder.path / "p%q",
+                                two = folder.path / "p/q";
+    {
+        std::filesystem::create_directories(one);
+        write(one / "a.toml", "seed = 1\n");
+        SceneDocument document(one / "a.toml");
+        document.edit("seed = 7\n", "edit");
+        std::filesystem::remove_all(one);  // it cannot be written beside
+        document.autosave(settings);
+    }
+    EXPECT_EQ(SceneDocument::opened(one / "a.toml", settings)->left_autosaves(settings).size(), 1u);
+    EXPECT_THROW(SceneDocument::opened(two / "a.toml", settings), Error);
+    std::filesystem::create_directories(two);
+    write(two / "a.toml", "seed = 1\n");
+    EXPECT_TRUE(SceneDocument(two / "a.toml").left_autosaves(settings).empty());
+}
+
 // The text of a file that is gone is nowhere else.
 TEST(SceneDocument, AFileThatIsGoneIsUnsaved) {
     const Folder folder;
@@ -562,6 +582,28 @@ TEST(SchemaValues, NewElementsHaveTheirRequiredKeys) {
         EXPECT_TRUE(SceneDocument(sky).problems().empty()) << path << "\n"
                                                            << format(SceneDocument(sky).problems()) << sky;
     }
+}
+
+// Whose values rise: in the middle to the next, or a step on; nowhere where there is no room.
+TEST(SchemaValues, CopiesHaveAPlaceOfTheirOwn) {
+    const auto place = [](const std::string& list, const std::string& items, std::size_t index) {
+        const SceneDocument document("name = \"a\"\n[[layer]]\nveil = {}\n" + items);
+        const TextPath at = text_path(list);
+        return place_of_copy(*key_at(at), *value_node(document.values(), at), index);
+    };
+    const std::string states = "presence = [{ state = 0, cover = 0 }, { state = 1, cover = 1 }]\n";
+    EXPECT_EQ(place("layer[0].presence", states, 0), (TextEntry{"state", "0.5"}));
+    EXPECT_THROW(place("layer[0].presence", states, 1), Error);  // 1 is the last
+    const auto winds = [](const std::string& first, const std::string& second) {
+        const std::string levels = "levels = [{ height_m = 0 }]\n";
+        return "[[layer.wind]]\ntime_s = " + first + "\n" + levels + "[[layer.wind]]\ntime_s = " + second +
+               "\n" + levels;
+    };
+    EXPECT_EQ(place("layer[0].wind", winds("0", "10"), 1), (TextEntry{"time_s", "610"}));
+    EXPECT_EQ(place("layer[0].wind", winds("100000000", "100000000.5"), 0),
+              (TextEntry{"time_s", "100000000.25"}));
+    EXPECT_THROW(place("layer[0].wind", winds("1", "1.0000000000000002"), 0), Error);
+    EXPECT_EQ(place("layer", "", 0), std::nullopt);
 }
 
 TEST(SchemaValues, RenamingFollowsReferences) {
