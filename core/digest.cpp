@@ -2,14 +2,11 @@
 #include "core/digest.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
-#include <istream>
+#include <fstream>
 #include <new>
 #include <vector>
 
-#include <fcntl.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include "core/descriptor.h"
@@ -58,21 +55,8 @@ void Digest::add(std::span<const std::byte> bytes) {
 std::string Digest::hex() const { return hex_of(XXH3_128bits_digest(state_->xxh3.get())); }
 
 FileDigest file_digest(const std::filesystem::path& path, std::uint64_t most) {
-    const Descriptor file = open_regular_file(path, O_RDONLY);
-    std::vector<std::byte> piece(kPieceBytes);
-    Digest digest;
-    FileDigest result;
-    while (result.bytes < most) {
-        const std::size_t wanted = std::size_t(std::min<std::uint64_t>(piece.size(), most - result.bytes));
-        const ssize_t count = ::read(file.get(), piece.data(), wanted);
-        if (count < 0 && errno == EINTR) continue;
-        if (count < 0) throw ReadFailure(path, std::strerror(errno));
-        if (count == 0) break;
-        digest.add(std::span(piece).first(std::size_t(count)));
-        result.bytes += std::uint64_t(count);
-    }
-    result.xxh3 = digest.hex();
-    return result;
+    std::ifstream file = open_stream(path);
+    return file_digest(file, path, most);
 }
 
 FileDigest file_digest(std::istream& file, const std::filesystem::path& path, std::uint64_t most) {

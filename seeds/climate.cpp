@@ -22,8 +22,8 @@ double state_at(std::span<const StatePoint> schedule, double time_s) {
     if (schedule.empty()) usage_error("the schedule of states is empty, expected at least one point");
     const auto after =
         std::ranges::find_if(schedule, [&](const StatePoint& p) { return p.time_s >= time_s; });
-    if (after == schedule.begin()) return schedule.front().state;
     if (after == schedule.end()) return schedule.back().state;
+    if (after == schedule.begin() || after->time_s == time_s) return after->state;
     const StatePoint& before = *(after - 1);
     return before.state +
            (after->state - before.state) * ((time_s - before.time_s) / (after->time_s - before.time_s));

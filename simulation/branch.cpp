@@ -21,6 +21,16 @@
 namespace nephos {
 namespace {
 
+// Returns true when the manifest beside a checkpoint, by the path that it was named by, is that of its run.
+bool is_of_run_beside(const std::filesystem::path& checkpoint) {
+    try {
+        return read_manifest(RunFolder{checkpoint.parent_path(), {}}.manifest()).simulation_hash ==
+               read_checkpoint(checkpoint).simulation_hash;
+    } catch (const Error&) {
+        return false;
+    }
+}
+
 // The checkpoint of a run, which is named by its folder or by the file itself.
 std::filesystem::path checkpoint_of(const std::filesystem::path& from) {
     const auto refuse = [&](const char* what) {
@@ -32,8 +42,7 @@ std::filesystem::path checkpoint_of(const std::filesystem::path& from) {
         if (!is_checkpoint(from)) refuse("is no checkpoint of a run");
         // What belongs to it lies beside it, or beside what a link leads to.
         const bool is_link = std::filesystem::is_symlink(std::filesystem::symlink_status(from, error));
-        const bool is_alone = !is_there(from.parent_path() / "manifest.json");
-        return is_link && is_alone ? std::filesystem::canonical(from) : from;
+        return is_link && !is_of_run_beside(from) ? std::filesystem::canonical(from) : from;
     }
     const std::filesystem::path checkpoint = from / "checkpoint.nephos";
     if (!is_there(checkpoint)) refuse("holds no checkpoint of a run");

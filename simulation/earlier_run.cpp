@@ -220,7 +220,9 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     for (const std::string& name : names_in_folder(folder.folder / "statistics")) {
         if (!published_name(name).empty()) continue;  // the leftover of a run that was killed
         const std::filesystem::path path = folder.folder / "statistics" / name;
-        if (is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
+        const bool is_link =
+            path.extension() == ".csv" && type_at(path) == std::filesystem::file_type::symlink;
+        if (is_link || is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
     }
     std::vector<std::filesystem::path> others{folder.checkpoint(), folder.statistics()};
     for (const std::string& name : names) others.push_back(RunFolder{folder.folder, name}.video());
@@ -236,7 +238,8 @@ void remove_leftovers(const RunFolder& folder, HeldFolders& held) {
         std::vector<std::filesystem::path> leftovers;
         for (const std::string& name : names_in_folder(place)) {
             const std::string published = published_name(name);
-            if (!published.empty() && is_ours(published)) leftovers.push_back(place / name);
+            const bool is_file = type_at(place / name) == std::filesystem::file_type::regular;
+            if (is_file && !published.empty() && is_ours(published)) leftovers.push_back(place / name);
         }
         if (!leftovers.empty() && held.can_hold(place)) held.remove(leftovers);
     };

@@ -149,23 +149,23 @@ struct Claim {
     std::vector<std::filesystem::path> replaced;
 };
 
-// Throws Error(io) for a link in place of a file of the run that is replaced again and again: it would lead to that of another.
-void refuse_links(const RunFolder& folder) {
+// Throws Error(io) for a link in place of a file of the run that is replaced or appended to: it would lead to that of another.
+void refuse_links(const RunFolder& folder, const Scene& scene) {
+    std::vector<std::filesystem::path> files{folder.manifest(), folder.checkpoint(), folder.statistics()};
+    for (const LayerOptions& layer : scene.layers) files.push_back(folder.statistics(layer.name));
     std::error_code error;
-    for (const std::filesystem::path& file : {folder.manifest(), folder.checkpoint()})
+    for (const std::filesystem::path& file : files)
         if (std::filesystem::is_symlink(std::filesystem::symlink_status(file, error)))
             throw Error(ErrorCode::io, file.string() + ": is a link, which is not followed here");
 }
 
-// Throws Error(io) where the tables of layers are in the folder of another run, whose tables they are.
-void refuse_tables_of_other_run(const RunFolder& folder) {
+// Throws where the folder of the layers' tables is a link: these are cut and appended to, and a copy of the run would share them.
+void refuse_linked_tables(const RunFolder& folder, ErrorCode code) {
     const std::filesystem::path tables = folder.folder / "statistics";
     std::error_code error;
-    if (!std::filesystem::is_symlink(std::filesystem::symlink_status(tables, error))) return;
-    const std::filesystem::path there = std::filesystem::weakly_canonical(tables, error).parent_path();
-    if (!error && is_there(there / "manifest.json"))
-        throw Error(ErrorCode::io, tables.string() + ": leads into another run, " + there.string() +
-                                       ", whose tables would be changed");
+    if (std::filesystem::is_symlink(std::filesystem::symlink_status(tables, error)))
+        throw Error(code,
+                    tables.string() + ": is a link, which is not followed here: put the folder itself there");
 }
 
 // Makes sure that nothing is lost where the run is to write, that it is there, and that nobody else writes there. Throws as
@@ -178,8 +178,8 @@ Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const s
         parts_of_run(folder, settings.scene, settings.range, settings.render);
     for (const std::filesystem::path& part : parts) claim.held.hold(part);  // before they are looked at
     if (settings.resume) {
-        refuse_links(folder);
-        refuse_tables_of_other_run(folder);
+        refuse_links(folder, settings.scene);
+        refuse_linked_tables(folder, ErrorCode::io);
     } else {
         for (bool is_more = true; is_more;) {
             is_more = false;
@@ -190,6 +190,7 @@ Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const s
         refuse_to_remove_inputs(folder, claim.replaced, inputs);
         if (settings.branch) refuse_to_remove_other_run(settings, claim.replaced);
         if (!settings.overwrite) refuse_to_lose(folder, claim.replaced, settings, inputs, found);
+        if (!settings.scene.layers.empty()) refuse_linked_tables(folder, ErrorCode::usage);
     }
     for (const std::filesystem::path& part : parts) create_folders(part);
     if (settings.range.has_frames()) refuse_shared_density_folders(folder, settings.scene);
@@ -286,10 +287,10 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     settings.resume = resumption == Resumption::go_on;
     std::vector<RunInput> inputs = inputs_of(settings);
     const auto claim = std::make_shared<Claim>(claim_folder(folder, settings, inputs, resumption, *lock));
-    const auto require_in_place = [lock, claim, folder] {
+    const auto require_in_place = [lock, claim, folder, &settings] {
         lock->require_in_place();
         claim->held.require_in_place();
-        refuse_links(folder);
+        refuse_links(folder, settings.scene);
     };
     recorder.set_guard(require_in_place);
     remove_leftovers(folder, claim->held);
@@ -339,6 +340,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     if (complete) {
         require_in_place();
         recorder.require_frames("was removed while the run was writing");
+        recorder.require_tables();
         recorder.write_manifest(true, seconds_since(begin));
         if (!settings.checkpoint) claim->held.remove({folder.checkpoint()});
     }

@@ -179,6 +179,16 @@ void RunRecorder::write_manifest(bool complete, double wall_s) {
     hash_saved_ = state_.state_hash;
 }
 
+void RunRecorder::require_tables() const {
+    const auto require = [](const std::filesystem::path& path, const StatisticsFile& table) {
+        if (file_digest(path) != table.content())
+            throw Error(ErrorCode::io, path.string() + ": was changed while the run was writing it");
+    };
+    require(folder_.statistics(), *statistics_);
+    for (std::size_t n = 0; n < layer_statistics_.size(); ++n)
+        require(folder_.statistics(settings_.scene.layers[n].name), layer_statistics_[n]);
+}
+
 void RunRecorder::start_video(const Simulation& simulation, std::function<bool()> stop) {
     if (!settings_.render || !wants_video(settings_.scene)) return;
     std::error_code error;

@@ -61,6 +61,9 @@ class RunRecorder : public SimulationSink {
     // Throws Error(io) when a file of a frame that is done is not there.
     void require_frames(const std::string& what) const;
 
+    // Throws Error(io) when a table has other bytes than were written.
+    void require_tables() const;
+
     // Frames and statistics first: what the checkpoint goes on from is then always there. So are the manifest's rain
     // and digests, which no other file has.
     void save(Simulation& simulation, double wall_s, bool with_checkpoint = true);

@@ -175,10 +175,12 @@ std::vector<LeftAutosave> left_autosaves(const fs::path& folder, const std::stri
 }
 
 std::string scene_of_autosave(const fs::path& file) {
+    constexpr std::string_view kScene = ".toml";
     const std::string name = file.filename().string();
-    const bool is_one = name.starts_with('.') && name.size() > kEnd.size() + 1 && name.ends_with(kEnd);
-    const std::string scene = is_one ? name.substr(1, name.size() - kEnd.size() - 1) : std::string();
-    return fs::path(scene).extension() == ".toml" ? scene : std::string();
+    const std::size_t at = name.rfind(kScene);
+    if (!name.starts_with('.') || at == std::string::npos || at < 2 || !name.ends_with(kEnd)) return {};
+    const std::string scene = name.substr(1, at + kScene.size() - 1);
+    return scene_of(name, scene) == scene ? scene : std::string();
 }
 
 void delete_autosave(const LeftAutosave& left) {

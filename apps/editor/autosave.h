@@ -53,8 +53,7 @@ class AutosaveFile {
 // are no files themselves; the newest first. Locked and empty ones are none. One that cannot be read is one with a problem.
 std::vector<LeftAutosave> left_autosaves(const std::filesystem::path& folder, const std::string& name);
 
-// Returns the scene file that edits in a file of the first of these names are of: that behind the dot and before ".autosave". Empty for
-// other names.
+// Returns the scene file ("*.toml") that edits in a file of one of these names are of; empty for other names.
 std::string scene_of_autosave(const std::filesystem::path& file);
 
 // Removes such a file. Throws Error(io) when another editor has it, or has written it anew.

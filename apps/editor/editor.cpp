@@ -24,6 +24,13 @@ using Clock = Report::Clock;
 constexpr double kFrameSeconds = 1.0 / 60, kIdleSeconds = 0.1;
 constexpr std::chrono::milliseconds kRowsAlone{200};
 
+// Before a scene is drawn: where the camera of the one before stands there may be ground.
+void send_scene_camera(Editor& editor) {
+    take_scene_camera(editor);
+    editor.view.camera = editor.camera.camera;
+    editor.live->set_view(editor.view);
+}
+
 // Sends what the document became to the live scene.
 void follow_document(Editor& editor) {
     if (editor.shown_version == editor.document->version()) return;
@@ -34,21 +41,21 @@ void follow_document(Editor& editor) {
         const double start = scene->frames.enabled ? scene->frames.start_s : 0;
         const Moment moment = moment_of(std::max(0.0, start), scene->automaton.time_step_s);
         editor.shown_scene = *scene;
+        send_scene_camera(editor);
         editor.live->start(*scene,
                            editor.start_step.value_or(std::min<std::uint64_t>(moment.step, scene->steps)));
-        take_scene_camera(editor);
         return;
     }
     const SceneChange change = change_between(*editor.shown_scene, *scene);
     const bool camera_changed = !(editor.shown_scene->render.camera == scene->render.camera);
     editor.shown_scene = *scene;
+    if (camera_changed) send_scene_camera(editor);
     if (change == SceneChange::simulation) {
         const LiveStatus status = editor.live->status();
         editor.live->start(*scene, std::max(status.goal, status.step));
     } else if (change == SceneChange::picture) {
         editor.live->redraw(*scene);
     }
-    if (camera_changed) take_scene_camera(editor);
 }
 
 // Gives a camera whose heights are above the ground those of the world, which its first picture knows: flying, pointing and
@@ -309,8 +316,12 @@ int loop(Editor& editor, Report& report) {
 std::unique_ptr<SceneDocument> first_document(Editor& editor) {
     namespace fs = std::filesystem;
     if (editor.options.scene.empty()) return std::make_unique<SceneDocument>(first_scene_text());
-    if (!fs::is_directory(editor.options.scene))
-        return SceneDocument::opened(editor.options.scene, editor.folder);
+    if (!fs::is_directory(editor.options.scene)) {
+        // Nobody is there to be asked about what was left of a scene that is gone.
+        const bool is_alone = !editor.options.screenshot.empty();
+        return is_alone ? std::make_unique<SceneDocument>(editor.options.scene)
+                        : SceneDocument::opened(editor.options.scene, editor.folder);
+    }
     std::vector<fs::path> scenes, gone;  // of those that are gone edits may be left
     for (const auto& entry : fs::directory_iterator(editor.options.scene)) {
         // Not what other programs keep beside: locks of Emacs, attributes of macOS.
@@ -319,7 +330,8 @@ std::unique_ptr<SceneDocument> first_document(Editor& editor) {
         if (entry.path().extension() == ".toml" && !is_hidden && entry.is_regular_file(error))
             scenes.push_back(entry.path());
         const std::string scene = scene_of_autosave(entry.path().filename());
-        if (!scene.empty()) gone.push_back(editor.options.scene / scene);
+        if (!scene.empty() && !left_autosaves(editor.options.scene, scene).empty())
+            gone.push_back(editor.options.scene / scene);
     }
     if (scenes.empty()) scenes = std::move(gone);
     if (scenes.empty()) {

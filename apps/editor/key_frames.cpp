@@ -97,8 +97,8 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || scene == nullptr) held.clear();
     if (scene == nullptr) return;
     const std::vector<KeyMark> marks = marks_of(*scene, editor.document->values());
-    const KeyMark* under_mouse =
-        nullptr;  // the nearest, and of those at one place the one that is drawn last
+    // The nearest, and of those at one place the one that is drawn last.
+    const KeyMark* under_mouse = nullptr;
     float nearest = hovered ? 1.6f * half : -1.0f;
     for (const KeyMark& mark : marks) {
         const float distance = std::abs(mouse.x - x_of(mark.time_s / step_s));

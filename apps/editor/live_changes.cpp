@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/text.h"
+#include "seeds/climate.h"
 
 namespace nephos {
 namespace {
@@ -45,7 +46,8 @@ std::vector<KeyFrame> key_frames(const std::vector<WindKeyframe>& keys) {
 // `before` every step gets one of its own, so that its steps keep their bits.
 std::vector<WindKeyframe> changed_keys(const Wind& before, const std::vector<WindLevel>& after,
                                        std::uint64_t step, double step_s) {
-    const double now = double(step) * step_s, last = now - step_s;
+    // As the simulation has them: now - step_s may be another number.
+    const double now = double(step) * step_s, last = (double(step) - 1) * step_s;
     std::vector<WindKeyframe> keys;
     for (const WindKeyframe& key : before.keyframes) {
         if (key.time_s <= last) keys.push_back(key);
@@ -395,16 +397,8 @@ void record_climate(Editor& editor, double final_state, double duration_s) {
     if (!has_follower)
         return say(editor, "The climate stays: each layer has states of its own, layer.climate", true);
     const double step_s = scene.automaton.time_step_s, now = double(held.step) * step_s;
-    const auto state_at = [&](double time_s) {
-        const std::vector<StatePoint>& points = scene.climate.schedule;
-        if (points.empty()) return 0.0;
-        if (time_s <= points.front().time_s) return points.front().state;
-        for (std::size_t n = 1; n < points.size(); ++n) {
-            if (time_s > points[n].time_s) continue;
-            const double part = (time_s - points[n - 1].time_s) / (points[n].time_s - points[n - 1].time_s);
-            return points[n - 1].state + part * (points[n].state - points[n - 1].state);
-        }
-        return points.back().state;
+    const auto state = [&](double time_s) {
+        return scene.climate.schedule.empty() ? 0.0 : state_at(scene.climate.schedule, time_s);
     };
     std::vector<StatePoint> points;
     for (const StatePoint& point : scene.climate.schedule) {
@@ -415,7 +409,7 @@ void record_climate(Editor& editor, double final_state, double duration_s) {
     const bool moving = points.size() < scene.climate.schedule.size() && !points.empty();
     for (std::uint64_t step = moving ? 0 : (held.step > 0 ? held.step - 1 : 0); step <= held.step; ++step) {
         const double time = double(step) * step_s;
-        if (time > from) points.push_back({time, state_at(time)});
+        if (time > from) points.push_back({time, state(time)});
     }
     points.push_back({now + std::max(duration_s, step_s), final_state});
     const bool done = attempt(editor, [&] {

@@ -50,8 +50,8 @@ void unsaved_dialog(Editor& editor) {
     if (!ImGui::BeginPopupModal(kTitle, nullptr,
                                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
         return;
-    const bool is_gone = editor.document->text() == editor.document->saved_text();
-    ImGui::Text(is_gone ? "The file of %s is gone from the disk." : "%s has edits that are not saved.",
+    ImGui::Text(editor.document->is_gone() ? "The file of %s is gone from the disk."
+                                           : "%s has edits that are not saved.",
                 editor.document->title().c_str());
     editor.controls.note("unsaved " + editor.document->title());
     ImGui::Spacing();
@@ -131,6 +131,10 @@ void recovery_dialog(Editor& editor) {
     }
     if (takes) attempt(editor, [&] { take_edits(editor, found); });
     ImGui::EndPopup();
+    // Of a scene whose file is gone nothing is left then.
+    if (answered && editor.left_autosaves.empty() && editor.document->is_gone() &&
+        editor.document->text().empty())
+        open_document(editor, std::make_unique<SceneDocument>(first_scene_text()));
 }
 
 void question_dialog(Editor& editor) {

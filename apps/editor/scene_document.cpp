@@ -26,25 +26,26 @@ std::optional<FileStamp> stamp_of(const fs::path& path) {
     return stamp == FileStamp{} ? std::nullopt : std::optional(stamp);
 }
 
-// Returns the name of the edits of a scene that are kept in another folder: with the path of its own, where links lead, or
-// its checksum where that is too long for a name. No two folders have the same.
-std::string name_elsewhere(const fs::path& folder, const std::string& name) {
-    constexpr std::size_t kLongest = 128;
+fs::path without_links(const fs::path& folder) {
     std::error_code error;
     const fs::path absolute = fs::absolute(folder, error);
-    fs::path path = fs::weakly_canonical(absolute, error);
-    if (error) path = normal_path(absolute);
-    std::string coded;
-    for (const char letter : path.string()) {
+    const fs::path path = fs::weakly_canonical(absolute, error);
+    return error ? normal_path(absolute) : path;
+}
+
+// Returns a folder's path as a part of a file's name, or its checksum where that is too long. No two folders have the same.
+std::string coded(const fs::path& folder) {
+    constexpr std::size_t kLongest = 128;
+    std::string out;
+    for (const char letter : folder.string()) {
         if (letter == '/')
-            coded += "%2F";
+            out += "%2F";
         else if (letter == '%')
-            coded += "%25";
+            out += "%25";
         else
-            coded += letter;
+            out += letter;
     }
-    if (coded.size() > kLongest) coded = "%" + digest_of(std::as_bytes(std::span(coded)));
-    return coded + "%%" + name;
+    return out.size() > kLongest ? "%" + digest_of(std::as_bytes(std::span(out))) : out;
 }
 
 }  // namespace
@@ -52,6 +53,7 @@ std::string name_elsewhere(const fs::path& folder, const std::string& name) {
 SceneDocument::SceneDocument(std::string text, std::string name, fs::path folder)
     : path_(std::move(name)), folder_(std::move(folder)) {
     saved_text_ = text;
+    real_folder_ = without_links(folder_);
     history_.push_back({std::move(text), "New"});
     read();
 }
@@ -60,6 +62,7 @@ SceneDocument::SceneDocument(const fs::path& path) : path_(path), has_file_(true
     FileText now = read_file(path);
     saved_text_ = std::move(now.text);
     file_stamp_ = now.stamp;
+    real_folder_ = without_links(this->folder());
     history_.push_back({saved_text_, "Open"});
     read();
 }
@@ -72,6 +75,7 @@ std::unique_ptr<SceneDocument> SceneDocument::opened(const fs::path& path, const
         if (fs::symlink_status(path, error).type() != fs::file_type::not_found) throw;
         auto gone = std::make_unique<SceneDocument>(std::string(), path.string());
         gone->has_file_ = gone->is_gone_ = true;
+        gone->real_folder_ = without_links(gone->folder());
         if (gone->left_autosaves(folder).empty()) throw;
         return gone;
     }
@@ -183,6 +187,7 @@ void SceneDocument::save_as(const fs::path& path) {
     const bool moved = !has_file_ || path != path_;
     remove_autosave();
     path_ = path;
+    real_folder_ = without_links(folder());
     has_file_ = true;
     is_gone_ = false;
     saved_text_ = text();
@@ -252,9 +257,13 @@ fs::path SceneDocument::autosave_folder(const fs::path& folder) const {
     return folder_.empty() ? folder : folder_;
 }
 
+// Of its edits in another folder.
+std::string SceneDocument::name_elsewhere() const { return coded(real_folder_) + "%%" + title(); }
+
 void SceneDocument::autosave(const fs::path& folder, const std::string& now) {
     look_whether_gone();
-    if (now == saved_text_ && !is_gone_) return remove_autosave();
+    const bool is_nothing = is_gone_ && now.empty();  // what was left of it was not taken
+    if (is_nothing || (now == saved_text_ && !is_gone_)) return remove_autosave();
     if (now == autosaved_text_ && autosave_.is_in_place()) return;
     const fs::path beside = autosave_folder(folder);
     try {
@@ -267,7 +276,7 @@ void SceneDocument::autosave(const fs::path& folder, const std::string& now) {
         try {
             create_folders(folder);
             AutosaveFile elsewhere;
-            elsewhere.write(folder, name_elsewhere(beside, title()), now);
+            elsewhere.write(folder, name_elsewhere(), now);
             autosave_.remove();  // of earlier edits
             autosave_ = std::move(elsewhere);
             is_kept = true;
@@ -282,8 +291,9 @@ std::vector<LeftAutosave> SceneDocument::left_autosaves(const fs::path& folder) 
     const fs::path beside = autosave_folder(folder);
     std::vector<LeftAutosave> left = nephos::left_autosaves(beside, title());
     if (beside != folder) {
-        const std::size_t before = name_elsewhere(beside, "").size();
-        for (LeftAutosave& one : nephos::left_autosaves(folder, name_elsewhere(beside, title()))) {
+        const std::string name = name_elsewhere();
+        const std::size_t before = name.size() - title().size();
+        for (LeftAutosave& one : nephos::left_autosaves(folder, name)) {
             one.scene.erase(0, before);
             std::error_code error;  // one that has a file is asked about with that
             if (one.scene == title() || !fs::exists(beside / one.scene, error))

@@ -71,6 +71,8 @@ class SceneDocument {
     // Returns whether there are edits that no file has: also of a file that is gone.
     bool is_modified() const { return is_gone_ || text() != saved_text_; }
     bool has_file() const { return has_file_; }
+    // Returns whether the file was gone when it was last looked at.
+    bool is_gone() const { return is_gone_; }
     const std::filesystem::path& path() const { return path_; }
     // The folder that names of files in the text are relative to; empty: the present one.
     std::filesystem::path folder() const;
@@ -115,6 +117,7 @@ class SceneDocument {
     void read();
     void take_from_disk(FileText now);
     std::filesystem::path autosave_folder(const std::filesystem::path& folder) const;
+    std::string name_elsewhere() const;
 
     std::vector<Version> history_;
     std::vector<Version> undone_;  // what could be done again before the step that goes on
@@ -123,6 +126,7 @@ class SceneDocument {
     std::filesystem::path path_;
     bool has_file_ = false, is_gone_ = false;  // gone: when it was looked at
     std::filesystem::path folder_;         // of one without a file
+    std::filesystem::path real_folder_;    // where links led when it was opened or saved
     std::optional<FileStamp> file_stamp_;  // of the version that saved_text_ is
     AutosaveFile autosave_;
     std::string autosaved_text_;

@@ -149,8 +149,8 @@ void print_failures(const SweepReport& report, const std::string& folder) {
     for (const std::string& failure : report.failures) print_message("  " + failure + "\n");
     if (report.progress.failed > 0)
         print_note(
-            fmt::format("{} of {} runs failed; {}/failures.csv has them with the command that repeats each, "
-                        "--retry-failed runs them again",
+            fmt::format("{} of {} runs failed; {}/failures.csv, once the tables are made, has them with the "
+                        "command that repeats each, --retry-failed runs them again",
                         report.progress.failed, report.progress.in_all, folder));
 }
 
@@ -227,6 +227,8 @@ int sweep(const SweepArguments& a) {
             output.line(fmt::format("  ... and {} more", human_count(plan.runs() - 10)));
         return status;
     }
+    if (a.allow_failures && a.fail_fast)
+        throw Error(ErrorCode::usage, "--allow-failures goes on where --fail-fast ends: give one of them");
     if (a.emit && a.shards > 1)
         throw Error(ErrorCode::usage,
                     "--emit writes all shards: leave out --shard, and give their number as --tasks");

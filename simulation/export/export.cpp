@@ -188,23 +188,40 @@ class GridReader {
     std::size_t bytes_ = 0;
 };
 
-std::vector<std::string> frame_names(const ExportOptions& options,
-                                     const std::vector<ExportSequence>& sequences) {
-    std::vector<std::string> names;
-    for (const ExportSequence& s : sequences)
-        for (const SourceFrame& frame : s.frames)
-            for (const ExportFormat format : all_formats(options))
-                if (format != ExportFormat::usd) names.push_back(frame_name(s, frame.number, format));
+std::string sidecar_name(const ExportSequence& s) { return s.name + ".volume.json"; }
+std::string pvd_name(const ExportSequence& s) { return s.name + ".pvd"; }
+
+// Of all layers together.
+std::string usd_name(const std::vector<ExportSequence>& sequences) {
+    const std::string &name = sequences.front().name, &layer = sequences.front().layer;
+    return (layer.empty() ? name : name.substr(0, name.size() - layer.size() - 1)) + ".usda";
+}
+
+constexpr const char* kReadme = "README.txt";
+
+// Of all files but summaries of weather.
+std::vector<std::string> file_names(const ExportOptions& options,
+                                    const std::vector<ExportSequence>& sequences) {
+    std::vector<std::string> names{kReadme};
+    for (const ExportFormat format : all_formats(options)) {
+        if (format == ExportFormat::usd) {
+            names.push_back(usd_name(sequences));
+            continue;
+        }
+        for (const ExportSequence& s : sequences) {
+            names.push_back(sidecar_name(s));
+            if (format == ExportFormat::vti) names.push_back(pvd_name(s));
+            for (const SourceFrame& frame : s.frames) names.push_back(frame_name(s, frame.number, format));
+        }
+    }
     return names;
 }
 
 // Writes and lists a file that is made of no density.
-void write_text_file(const std::filesystem::path& folder, ExportList& list, const std::string& name,
-                     std::span<const std::byte> content, std::vector<std::string>& notes) {
+void write_text_file(ExportList& list, const std::string& name, std::span<const std::byte> content,
+                     std::vector<std::string>& notes) {
     if (std::string note = list.note_on_change(name); !note.empty()) notes.push_back(std::move(note));
-    list.begin({name});
-    list.write(false);
-    write_atomically(folder / name, content);
+    list.write_file(name, [&](const std::filesystem::path& path) { write_atomically(path, content); });
     list.add_written(list.written_file(name, {}, {}));
 }
 
@@ -218,7 +235,7 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
     std::ranges::move(limit_notes(options.weather, frames), std::back_inserter(notes));
     const auto write_file = [&](std::string_view extension, std::span<const std::byte> content) {
         const std::string name = run.scene.name + std::string(extension);
-        write_text_file(options.folder, list, name, content, notes);
+        write_text_file(list, name, content, notes);
     };
     const auto write = [&](WeatherFormat format, std::span<const std::byte> content) {
         for (const NamedWeather& named : weather_formats())
@@ -275,26 +292,22 @@ void write_texts(const ExportOptions& options, const std::vector<ExportSequence>
                  std::vector<std::string>& notes) {
     if (!options.weather.empty()) write_weather(options, list, notes);
     const auto write = [&](const std::string& name, const std::string& text) {
-        write_text_file(options.folder, list, name, std::as_bytes(std::span(text)), notes);
+        write_text_file(list, name, std::as_bytes(std::span(text)), notes);
     };
     const std::vector<ExportFormat> formats = all_formats(options);
     for (std::size_t n = 0; n < sequences.size(); ++n) {
         const ExportSequence& s = sequences[n];
         if (formats.empty()) break;
-        write(s.name + ".volume.json", sidecar_text(options, s, figures[n]));
+        write(sidecar_name(s), sidecar_text(options, s, figures[n]));
         if (std::ranges::count(formats, ExportFormat::vti) == 0) continue;
         std::vector<PvdEntry> entries;
         for (const SourceFrame& frame : s.frames)
             entries.push_back({frame.time_s, frame_name(s, frame.number, ExportFormat::vti)});
-        write(s.name + ".pvd", pvd_text(entries));
+        write(pvd_name(s), pvd_text(entries));
     }
-    if (std::ranges::count(formats, ExportFormat::usd) > 0) {
-        const std::string& name = sequences.front().name;
-        const std::string& layer = sequences.front().layer;
-        write((layer.empty() ? name : name.substr(0, name.size() - layer.size() - 1)) + ".usda",
-              usd_text(options, sequences));
-    }
-    write("README.txt", readme_text(options, sequences));
+    if (std::ranges::count(formats, ExportFormat::usd) > 0)
+        write(usd_name(sequences), usd_text(options, sequences));
+    write(kReadme, readme_text(options, sequences));
 }
 
 }  // namespace
@@ -333,7 +346,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     refuse_own_folder(options, sequences);
     const FolderLock lock(options.folder, "export");
     ExportList list(options, sequences);
-    list.begin(frame_names(options, sequences));
+    list.require_free(file_names(options, sequences));
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());
     const auto take = [&](const ExportSequence& s, std::vector<FrameFigures>& of, ExportedFrame&& frame) {

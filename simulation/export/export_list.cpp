@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/export/export_list.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <set>
 #include <system_error>
 #include <vector>
 
 #include <nlohmann/json.hpp>
+#include <unistd.h>
 
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
@@ -132,6 +134,15 @@ void claim(const std::filesystem::path& folder) {
     if (error) throw Error(ErrorCode::io, folder.string() + ": cannot be examined: " + error.message());
 }
 
+// Of a list, also a complete one: there may be files of an export that was killed, and in no list.
+constexpr const char* kUnlisted = "unlisted";
+
+[[noreturn]] void throw_other(const std::filesystem::path& path) {
+    throw Error(ErrorCode::usage, path.string() +
+                                      ": is there already, and no export of this has written it: move it "
+                                      "away, or choose another folder");
+}
+
 }  // namespace
 
 bool is_export_folder(const std::filesystem::path& folder) {
@@ -148,10 +159,8 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     std::vector<ExportedFile> files;
     for (const CheckedJson& file : CheckedJson(json, path).at("files").items())
         files.push_back(file_of(file));
-    if (json.contains("begun"))
-        for (const CheckedJson& name : CheckedJson(json, path).at("begun").items())
-            begun_.insert(name.text());
-    json.erase("begun");
+    may_be_unlisted_ = !CheckedJson(json, path).at("complete").truth() || json.contains(kUnlisted);
+    json.erase(kUnlisted);
     json.erase("files");
     json.erase("complete");
     json.erase(kSealKey);
@@ -165,16 +174,14 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     }
 }
 
-void ExportList::begin(const std::vector<std::string>& names) {
-    for (const std::string& name : names) {
-        const std::filesystem::path path = folder_ / name;
-        if (!earlier_.contains(name) && !begun_.contains(name) && stands_there(path))
-            throw Error(ErrorCode::usage,
-                        path.string() +
-                            ": is there already, and no export has written it: move it away, or "
-                            "choose another folder");
-    }
-    begun_.insert(names.begin(), names.end());
+bool ExportList::is_other(const std::string& name) const {
+    return !earlier_.contains(name) && stands_there(folder_ / name);
+}
+
+void ExportList::require_free(const std::vector<std::string>& names) const {
+    if (may_be_unlisted_) return;
+    for (const std::string& name : names)
+        if (is_other(name)) throw_other(folder_ / name);
 }
 
 std::optional<ExportedFile> ExportList::kept_file(const std::string& name, const ExportSource& source) const {
@@ -194,7 +201,22 @@ std::string ExportList::note_on_change(const std::string& name) const {
     const std::filesystem::path path = folder_ / name;
     if (found == earlier_.end() || !std::filesystem::is_regular_file(path, error)) return {};
     if (file_digest(path) == found->second.digest) return {};
-    return path.string() + ": was changed since an earlier export wrote it, and is made again";
+    return path.string() + ": is not as an earlier export had listed it, and is made again";
+}
+
+void ExportList::write_file(const std::string& name,
+                            const std::function<void(const std::filesystem::path& path)>& write) const {
+    const std::filesystem::path path = folder_ / name;
+    if (!is_other(name)) return write(path);
+    // A name that claim() takes for a leftover, should this be killed.
+    const std::string part = ".part" + std::to_string(::getpid()) + "-0";
+    const std::filesystem::path made =
+        folder_ / ("." + path.stem().string() + part + path.extension().string());
+    write(made);
+    const bool is_same = file_digest(made) == file_digest(path);
+    std::error_code error;
+    std::filesystem::remove(made, error);
+    if (!is_same) throw_other(path);
 }
 
 ExportedFile ExportList::written_file(const std::string& name, const ExportSource& source,
@@ -240,12 +262,17 @@ void ExportList::write(bool complete) const {
     for (const auto& [path, file] : earlier_)
         if (!complete && !listed.contains(path)) add(file);
     json["files"] = std::move(files);
-    Json begun = Json::array();
-    for (const std::string& name : begun_)
-        if (!listed.contains(name) && !earlier_.contains(name)) begun.push_back(name);
-    if (!complete && !begun.empty()) json["begun"] = std::move(begun);
+    if (complete && may_be_unlisted_ && has_other_files()) json[kUnlisted] = true;
     write_atomically(folder_ / "export.json",
                      std::string_view(sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace))));
+}
+
+bool ExportList::has_other_files() const {
+    std::set<std::string> listed{"export.json"};
+    for (const ExportedFile& file : files_) listed.insert(file.path.generic_string());
+    return std::ranges::any_of(names_in_folder(folder_), [&](const std::string& name) {
+        return !listed.contains(name) && published_name(name).empty();
+    });
 }
 
 std::vector<std::string> ExportList::remove_left_over() const {

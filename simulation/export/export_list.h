@@ -4,9 +4,9 @@
 // export.json: the options of an export, and each of its files with bytes, checksum and source (not installed).
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -31,15 +31,19 @@ class ExportList {
     // holds an export with other options, or a file without a list; Error(io) when the list is damaged.
     ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
 
-    // Names files that are about to be written: from the next write() on they are known as those of this export, also should it be
-    // killed. Throws Error(usage) where one is there that no export has listed or named.
-    void begin(const std::vector<std::string>& names);
+    // Throws Error(usage) naming the first of these files that is there and that no export has written, where that is known: not
+    // where one was killed, which may have left files that it had not listed yet.
+    void require_free(const std::vector<std::string>& names) const;
     // Returns the entry of a file that is there as it was listed, and was made of this source: it need not be written
     // again. Thread-safe.
     std::optional<ExportedFile> kept_file(const std::string& name, const ExportSource& source) const;
-    // Returns what is to be told of a listed file that somebody changed, and that is about to be made again; empty: nothing.
-    // Thread-safe.
+    // Returns what is to be told of a file that is not as it was listed, and is about to be made again; empty: nothing. Thread-safe.
     std::string note_on_change(const std::string& name) const;
+    // Calls `write` with the path that it is to write. What stands there unlisted, after an export that was killed, stays, and is the
+    // file, if `write` makes the same; otherwise it is somebody's. Thread-safe for different files. Throws Error(usage) naming it
+    // then; exceptions of `write` pass through.
+    void write_file(const std::string& name,
+                    const std::function<void(const std::filesystem::path& path)>& write) const;
     // Returns the entry of a file that was written, with its checksum. Thread-safe. Throws Error(io).
     ExportedFile written_file(const std::string& name, const ExportSource& source, std::string_view format) const;
     // List a file; those of frames in their order.
@@ -57,12 +61,14 @@ class ExportList {
     std::size_t kept() const { return kept_; }
 
   private:
+    bool is_other(const std::string& name) const;
+    bool has_other_files() const;
     std::string below_folder(const std::filesystem::path& source) const;
 
     std::filesystem::path folder_;
     std::string head_;  // JSON of all but the files
     std::map<std::string, ExportedFile> earlier_;
-    std::set<std::string> begun_;
+    bool may_be_unlisted_ = false;  // files of an export that was killed
     std::vector<ExportedFile> files_;
     std::size_t written_ = 0, kept_ = 0;
 };

@@ -147,7 +147,9 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
         }
         if (std::string note = list_.note_on_change(name); !note.empty())
             result.notes.push_back(std::move(note));
-        write_format(options_.folder / name, format, s, frame, loaded, source, made);
+        list_.write_file(name, [&](const std::filesystem::path& path) {
+            write_format(path, format, s, frame, loaded, source, made);
+        });
         ExportedFile file = list_.written_file(name, source, name_of(format));
         if (format == ExportFormat::vdb && is_copy(options_, s, frame, source) &&
             !(file.digest == source.digest))

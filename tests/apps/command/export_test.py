@@ -404,13 +404,35 @@ class Export(Case):
         folder = self.export("out", "--to", "raw", "--frames", "1..2")
         (folder / "placed_0003.raw").write_bytes(b"mine")
         (folder / "placed_0002.raw").write_bytes(b"edited")
-        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0003.raw: is there already, and no export has written it")
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0003.raw: is there already, and no export of this has written it")
         self.assertEqual([(folder / f"placed_000{n}.raw").read_bytes() for n in (2, 3)], [b"edited", b"mine"])
         (folder / "placed_0003.raw").unlink()
         said = self.call("export", "run", "--to", "raw", "-o", "out").stderr
-        self.assertIn("placed_0002.raw: was changed since an earlier export wrote it, and is made again", said)
+        self.assertIn("placed_0002.raw: is not as an earlier export had listed it, and is made again", said)
         self.call("verify", "out")
-        self.assertNotIn("begun", json.loads((folder / "export.json").read_text()))
+
+    def test_files_of_a_killed_export_are_told_from_others(self):
+        """It may have left some that it had not listed: what is the same is one of these, also after a smaller export."""
+        whole = self.export("whole", "--to", "raw")
+        for between in ([], ["--frames", "1..2"]):
+            folder = self.export("out", "--to", "raw", "--frames", "1")
+            listing = json.loads((folder / "export.json").read_text())
+            (folder / "export.json").write_text(unsealed({**listing, "complete": False}))
+            for number in (3, 4):
+                shutil.copy(whole / f"placed_000{number}.raw", folder)
+            if between:
+                self.call("export", "run", "--to", "raw", *between, "-o", "out")
+                self.assertIn("placed_0003.raw is listed nowhere", self.call("verify", "out", status=1).stdout)
+            own = (folder / "placed_0004.raw").read_bytes()
+            (folder / "placed_0004.raw").write_bytes(b"mine")
+            self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0004.raw: is there already, and no export of this has written it")
+            self.assertEqual((folder / "placed_0004.raw").read_bytes(), b"mine")
+            (folder / "placed_0004.raw").write_bytes(own)
+            self.call("export", "run", "--to", "raw", "-o", "out")
+            self.call("verify", "out")
+            self.assertNotIn("unlisted", json.loads((folder / "export.json").read_text()))
+            self.assertEqual(sorted(path.name for path in folder.iterdir()), sorted(path.name for path in whole.iterdir()))
+            shutil.rmtree(folder)
 
     def test_sequences_are_numbered_from_0(self):
         """As most programs number them."""

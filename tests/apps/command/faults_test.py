@@ -382,6 +382,24 @@ class Faults(Case):
                 self.call("run", self.scene, "--no-render", "--out", "a")
         self.assertGreater(stops, 10)
 
+    def test_a_table_that_is_changed_after_its_last_row_is_missed_at_the_end(self):
+        """By an editor or a spreadsheet, in place or by another file, while the checkpoint or the video is made."""
+        def changed(in_place):
+            table = self.folder / "out/statistics.csv"
+            rows = table.read_text().replace(",0.", ",9.", 1)
+            if in_place:
+                table.write_text(rows)
+            else:
+                self.write("other.csv", rows)
+                (self.folder / "other.csv").rename(table)
+        for in_place in (True, False):
+            status, said = self.stopped_at("rename STOP 1 1", "checkpoint.nephos", lambda: changed(in_place), "run", self.scene, "--no-render", "--checkpoint",
+                                           "-q", "--out", "out")
+            self.assertEqual(status, 3, said)
+            self.assertIn("statistics.csv: was changed while the run was writing it", said)
+            self.assertFalse(json.loads((self.folder / "out/manifest.json").read_text())["complete"])
+            shutil.rmtree(self.folder / "out")
+
     def test_parts_that_are_removed_are_missed_at_the_end(self):
         for name in ("density/long_0002.vdb", "statistics.csv"):
             process = self.started("out")

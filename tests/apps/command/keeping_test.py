@@ -522,17 +522,37 @@ class Keeping(Case):
             self.assertIn("is a link, which is not followed here" if (out / name).is_symlink() else "was removed or replaced", said)
             self.assertEqual(self.files("done"), before)
 
-    def test_a_run_whose_tables_are_in_another_run_is_not_resumed(self):
-        """By a link of their folder: rows would be appended to that one's."""
+    def test_a_link_in_place_of_a_table_is_not_followed(self):
+        """A run and a branch refuse it, or remove it with --overwrite; what it leads to stays."""
         scene = self.write("layered.toml", LAYERED)
         self.call("run", scene, "--no-render", "--out", "a")
-        shutil.copytree(self.folder / "a", self.folder / "b")
-        shutil.rmtree(self.folder / "b/statistics")
-        (self.folder / "b/statistics").symlink_to("../a/statistics")
-        before = self.files("a")
-        resumed = self.call("run", scene, "--no-render", "--resume", "--set", "time.steps=90", "--out", "b", status=3)
-        self.assertIn("b/statistics: leads into another run", resumed.stderr)
-        self.assertEqual(self.files("a"), before)
+        (self.folder / "diary.txt").write_text("mine")
+        for name in ("statistics/low.csv", "statistics.csv"):
+            for command in (["run", scene, "--no-render"], ["run", "--from", "a", "--no-render", "--set", "time.steps=30"]):
+                link = self.folder / "b" / name
+                link.parent.mkdir(parents=True)
+                link.symlink_to(self.folder / "diary.txt")
+                self.refused(2, *command, "--out", "b", says=pathlib.Path(name).name)
+                self.call(*command, "--out", "b", "--overwrite")
+                self.assertEqual((self.folder / "diary.txt").read_text(), "mine")
+                self.call("verify", "b")
+                shutil.rmtree(self.folder / "b")
+
+    def test_a_run_whose_tables_are_behind_a_link_is_not_resumed(self):
+        """A copy of it shares them, which would be cut or appended to; and none begins so."""
+        scene = self.write("layered.toml", LAYERED)
+        self.call("run", scene, "--no-render", "--out", "a")
+        (self.folder / "a/statistics").rename(self.folder / "elsewhere")
+        for name in "ab":
+            (self.folder / name / "statistics").symlink_to("../elsewhere") if name == "a" else shutil.copytree(self.folder / "a", self.folder / "b", symlinks=True)
+            before = self.files("elsewhere")
+            resumed = self.call("run", scene, "--no-render", "--resume", "--set", "time.steps=90", "--out", name, status=3)
+            self.assertIn(f"{name}/statistics: is a link, which is not followed here", resumed.stderr)
+            self.assertEqual(self.files("elsewhere"), before)
+        (self.folder / "c").mkdir()
+        (self.folder / "empty").mkdir()
+        (self.folder / "c/statistics").symlink_to("../empty")
+        self.kept("c", 2, "run", scene, "--no-render", "--out", "c", says="c/statistics: is a link, which is not followed here")
 
     def test_a_folder_that_is_moved_away_does_not_come_back(self):
         for n in range(6):

@@ -322,7 +322,16 @@ class Branch(Case):
         (self.folder / "apart/checkpoint.nephos").unlink()
         (self.folder / "apart/checkpoint.nephos").symlink_to("../alone/checkpoint.nephos")
         self.call(*branch, "apart/checkpoint.nephos", "--out", "e")
-        self.assertEqual(len({(self.folder / name / "statistics.csv").read_bytes() for name in "cde"}), 1)
+        # Of another run, or of none, it says nothing of the link.
+        self.call("run", scene, "--no-render", "--seed", "9", "--out", "other")
+        for name, content in (("other/from", None), ("web/from", "{}")):
+            link = self.folder / name
+            link.parent.mkdir(exist_ok=True)
+            link.symlink_to("../source/checkpoint.nephos")
+            if content:
+                (link.parent / "manifest.json").write_text(content)
+            self.call(*branch, name, "--out", "f" + name[0])
+        self.assertEqual(len({(self.folder / name / "statistics.csv").read_bytes() for name in ("c", "d", "e", "fo", "fw")}), 1)
 
     def test_goes_on_without_the_other_run(self):
         self.begin()

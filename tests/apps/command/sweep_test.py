@@ -612,6 +612,7 @@ sd = 0.05
         self.refused(2, "sweep", self.null, "--seed", 2**63, *axis, "large", says="is not from 0 to 9223372036854775807")
         self.refused(2, "sweep", self.null, *axis, "both", "--emit", "slurm", "--shard", "0/2", says="leave out --shard")
         self.refused(2, "sweep", self.null, *axis, "tasks", "--tasks", "3", says="--emit")
+        self.refused(2, "sweep", "--quiet", self.null, *axis, "scripts", "--fail-fast", "--allow-failures", says="give one of them")
         for option in (["--retry-failed"], ["--fail-fast"], ["--allow-failures"], ["-j", "3"], ["--json"], ["--overwrite"]):
             self.refused(2, "sweep", self.null, *axis, "tasks", "--emit", "slurm", *option, says="--emit runs nothing")
         # Beside records, too, whether complete or killed in the first runs.
@@ -979,6 +980,7 @@ sd = 0.05
                                              r"--seed \d+ --set time\.steps=30000 --out run-[0-9a-f]{8}$")
         self.assertIn("1 failed", self.call(*arguments, "--status").stdout)
         self.call(*arguments, status=1)  # it is not tried again unasked
+        self.call(*arguments, "--allow-failures")
         self.call(*arguments, "--retry-failed")
         self.assertEqual([run["status"] for run in rows(self.folder / "crash/runs.csv")], ["done", "done"])
 

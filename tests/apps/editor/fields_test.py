@@ -159,6 +159,19 @@ class Fields(Kept):
         replay = subprocess.run([NEPHOS, "hash", scene, "--steps", str(len(seen) - 1)], capture_output=True, text=True, check=True)
         self.assertEqual(replay.stdout.splitlines(), seen)
 
+    def test_winds_recorded_between_steps_of_fractions_are_replayed(self):
+        """The wind before is kept up to the time of the step before, to the last bit: 3.5 s, and not 4.2 s less 0.7 s."""
+        scene = self.folder / "w.toml"
+        scene.write_text('seed = 4\n[lattice]\ncells = [16, 16, 12]\n[time]\nstep_s = 0.7\nsteps = 60\n'
+                         '[[wind]]\nlevels = [{ height_m = 1000, east_m_per_s = 100, north_m_per_s = 0 }]\n', encoding="utf-8")
+        self.edit(scene, script='wait 0.3\nkey SPACE\nkey HOME\nwait 0.5\n' + "key .\nwait 0.3\n" * 4 + 'click "tab View"\nclick "Record as key frames"\n'
+                                'click wind\nclick wind[0]\nclick wind[0].levels\nclick wind[0].levels[0]\nclick "tab Properties"\nwait 0.3\n'
+                                'set wind[0].levels[0].east_m_per_s 190\nwait 0.5\nkey CTRL+S\nwait 0.5\n')
+        times = [frame["time_s"] for frame in tomllib.loads(scene.read_text(encoding="utf-8"))["wind"][-2:]]
+        step = round(times[1] / 0.7)
+        self.assertEqual(times, [(step - 1) * 0.7, step * 0.7])
+        self.assertIn(step, (6, 11, 12), "a step whose time less 0.7 s is another number")
+
     def test_what_is_recorded_on_the_way_to_a_step_is_of_that_step(self):
         """While the simulation is made anew up to what the time line shows: the steps that were seen keep their wind."""
         scene = self.folder / "w.toml"

@@ -134,6 +134,17 @@ class Opening(Kept):
             self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
             self.assertEqual([path.name for path in scene.parent.iterdir()], ["a.toml"])
 
+    def test_what_is_left_of_a_file_that_is_gone_may_be_deleted(self):
+        """Then nothing is left, and the editor goes to a new scene; a picture of it is none."""
+        scene = self.folder / "gone/a.toml"
+        scene.parent.mkdir()
+        left = scene.parent / ".a.toml.autosave"
+        left.write_text(STATE, encoding="utf-8")
+        self.edit(scene, "--screenshot", "p.png", status=3)
+        self.edit(scene, script='wait 1\nclick "Delete them"\nwait 6\nwait-step 1\nkey CTRL+Q\nwait 0.5\n')
+        self.assertEqual(list(scene.parent.iterdir()), [])
+        self.edit(scene.parent, status=2)
+
     def test_a_file_that_cannot_be_opened_ends_a_drop(self):
         """Those behind it are not opened without a word."""
         self.two(STATE, STATE)

@@ -378,6 +378,21 @@ TEST(SceneDocument, EditsKeptElsewhereAreOfOneFolder) {
     std::filesystem::create_directories(two);
     write(two / "a.toml", "seed = 1\n");
     EXPECT_TRUE(SceneDocument(two / "a.toml").left_autosaves(settings).empty());
+    // Reached by a link that leads nowhere while they are kept.
+    const std::filesystem::path disk = folder.path / "disk", away = folder.path / "away",
+                                link = folder.path / "link";
+    std::filesystem::create_directory(disk);
+    std::filesystem::create_symlink("disk", link);
+    write(disk / "a.toml", "seed = 1\n");
+    {
+        SceneDocument document(link / "a.toml");
+        document.edit("seed = 8\n", "edit");
+        std::filesystem::rename(disk, away);
+        document.autosave(settings);
+    }
+    std::filesystem::rename(away, disk);
+    EXPECT_EQ(SceneDocument(link / "a.toml").left_autosaves(settings).size(), 1u);
+    EXPECT_EQ(SceneDocument(disk / "a.toml").left_autosaves(settings).size(), 1u);
 }
 
 // The text of a file that is gone is nowhere else.
