@@ -60,6 +60,13 @@ void check_reading(const std::istream& stream, const std::filesystem::path& path
     if (stream.bad()) throw ReadFailure(path, errno != 0 ? std::strerror(errno) : "unknown error");
 }
 
+void rewind(std::istream& stream, const std::filesystem::path& path) {
+    errno = 0;
+    stream.clear();
+    stream.seekg(0);
+    if (!stream) throw ReadFailure(path, errno != 0 ? std::strerror(errno) : "unknown error");
+}
+
 std::string read_beginning(const std::filesystem::path& path, std::size_t most) {
     const Descriptor file = open_regular_file(path, O_RDONLY);
     std::string text(most, '\0');

@@ -72,6 +72,9 @@ class ReadFailure : public Error {
 // Throws ReadFailure when reading from the stream of a file has just failed; its end is no failure.
 void check_reading(const std::istream& stream, const std::filesystem::path& path);
 
+// Goes back to the beginning of the file of a stream, whose end or failure before is forgotten. Throws ReadFailure.
+void rewind(std::istream& stream, const std::filesystem::path& path);
+
 // Returns at most `most` bytes from the beginning of a file. Throws as open_regular_file(), and ReadFailure.
 std::string read_beginning(const std::filesystem::path& path, std::size_t most);
 

@@ -2,11 +2,14 @@
 #include "core/digest.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
-#include <fstream>
+#include <istream>
 #include <new>
 #include <vector>
 
+#include <fcntl.h>
+#include <unistd.h>
 #include <xxhash.h>
 
 #include "core/descriptor.h"
@@ -54,26 +57,45 @@ void Digest::add(std::span<const std::byte> bytes) {
 
 std::string Digest::hex() const { return hex_of(XXH3_128bits_digest(state_->xxh3.get())); }
 
+namespace {
+
+// Of at most so many bytes that `read` gives, which fills a piece from its front and returns how many it has; 0: the end.
+template <typename Read>
+FileDigest digest_of_pieces(std::uint64_t most, const Read& read) {
+    std::vector<std::byte> piece(kPieceBytes);
+    Digest digest;
+    FileDigest result;
+    while (result.bytes < most) {
+        const std::size_t wanted = std::size_t(std::min<std::uint64_t>(piece.size(), most - result.bytes));
+        const std::size_t count = read(std::span(piece).first(wanted));
+        if (count == 0) break;
+        digest.add(std::span(piece).first(count));
+        result.bytes += count;
+    }
+    result.xxh3 = digest.hex();
+    return result;
+}
+
+}  // namespace
+
 FileDigest file_digest(const std::filesystem::path& path, std::uint64_t most) {
-    std::ifstream file = open_stream(path);
-    return file_digest(file, path, most);
+    const Descriptor file = open_regular_file(path, O_RDONLY);
+    return digest_of_pieces(most, [&](std::span<std::byte> piece) {
+        ssize_t count;
+        do count = ::read(file.get(), piece.data(), piece.size());
+        while (count < 0 && errno == EINTR);
+        if (count < 0) throw ReadFailure(path, std::strerror(errno));
+        return std::size_t(count);
+    });
 }
 
 FileDigest file_digest(std::istream& file, const std::filesystem::path& path, std::uint64_t most) {
-    std::vector<char> piece(kPieceBytes);
-    Digest digest;
-    FileDigest result;
-    file.clear();
-    file.seekg(0);
-    while (file && result.bytes < most) {
-        file.read(piece.data(), std::streamsize(std::min<std::uint64_t>(piece.size(), most - result.bytes)));
-        const auto count = std::size_t(file.gcount());
-        digest.add(std::string_view(piece.data(), count));
-        result.bytes += count;
-    }
-    check_reading(file, path);
-    result.xxh3 = digest.hex();
-    return result;
+    rewind(file, path);
+    return digest_of_pieces(most, [&](std::span<std::byte> piece) {
+        file.read(reinterpret_cast<char*>(piece.data()), std::streamsize(piece.size()));
+        check_reading(file, path);
+        return std::size_t(file.gcount());
+    });
 }
 
 std::string digest_of(std::span<const std::byte> bytes) {

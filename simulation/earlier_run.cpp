@@ -220,9 +220,7 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     for (const std::string& name : names_in_folder(folder.folder / "statistics")) {
         if (!published_name(name).empty()) continue;  // the leftover of a run that was killed
         const std::filesystem::path path = folder.folder / "statistics" / name;
-        const bool is_link =
-            path.extension() == ".csv" && type_at(path) == std::filesystem::file_type::symlink;
-        if (is_link || is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
+        if (is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
     }
     std::vector<std::filesystem::path> others{folder.checkpoint(), folder.statistics()};
     for (const std::string& name : names) others.push_back(RunFolder{folder.folder, name}.video());

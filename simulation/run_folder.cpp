@@ -168,6 +168,16 @@ void refuse_linked_tables(const RunFolder& folder, ErrorCode code) {
                     tables.string() + ": is a link, which is not followed here: put the folder itself there");
 }
 
+// Adds links in place of the tables that a run of the scene writes, whatever they lead to.
+void add_linked_tables(const RunFolder& folder, const Scene& scene,
+                       std::vector<std::filesystem::path>& files) {
+    for (const LayerOptions& layer : scene.layers) {
+        const std::filesystem::path table = folder.statistics(layer.name);
+        const bool is_link = type_at(table) == std::filesystem::file_type::symlink;
+        if (is_link && std::ranges::find(files, table) == files.end()) files.insert(files.begin(), table);
+    }
+}
+
 // Makes sure that nothing is lost where the run is to write, that it is there, and that nobody else writes there. Throws as
 // run_scene().
 Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const std::vector<RunInput>& inputs,
@@ -184,6 +194,7 @@ Claim claim_folder(const RunFolder& folder, const RunSettings& settings, const s
         for (bool is_more = true; is_more;) {
             is_more = false;
             claim.replaced = earlier_files(folder);
+            add_linked_tables(folder, settings.scene, claim.replaced);
             for (const std::filesystem::path& file : claim.replaced)
                 is_more = claim.held.hold(file.parent_path()) || is_more;
         }

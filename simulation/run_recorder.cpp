@@ -170,7 +170,7 @@ void RunRecorder::write_manifest(bool complete, double wall_s) {
     state_.run_files.clear();
     if (complete) {
         for (const std::filesystem::path& path : run_files())
-            state_.run_files.push_back({relative(path), file_digest(path), {}});
+            state_.run_files.push_back({relative(path), digest_of_run_file(path), {}});
     }
     state_.wall_s = wall_s;
     const PublishCheck check(guard_);
@@ -236,6 +236,14 @@ std::vector<std::filesystem::path> RunRecorder::run_files() const {
     if (settings_.checkpoint) files.push_back(folder_.checkpoint());
     if (settings_.render && wants_video(settings_.scene)) files.push_back(folder_.video());
     return files;
+}
+
+// Of a table what was written, and not what may have become of it since.
+FileDigest RunRecorder::digest_of_run_file(const std::filesystem::path& path) const {
+    if (path == folder_.statistics()) return statistics_->content();
+    for (std::size_t n = 0; n < layer_statistics_.size(); ++n)
+        if (path == folder_.statistics(settings_.scene.layers[n].name)) return layer_statistics_[n].content();
+    return file_digest(path);
 }
 
 std::vector<FileRecord> RunRecorder::digests_of_frame(int number) const {

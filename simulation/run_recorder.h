@@ -101,6 +101,7 @@ class RunRecorder : public SimulationSink {
     std::vector<std::filesystem::path> run_files() const;
 
     // For frames of a run whose manifest, of an earlier version, names no digests.
+    FileDigest digest_of_run_file(const std::filesystem::path& path) const;
     std::vector<FileRecord> digests_of_frame(int number) const;
 
     // By the thread that writes.

@@ -89,8 +89,7 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
 std::uint64_t read_statistics(std::istream& stream, const std::filesystem::path& path, std::uint64_t steps,
                               const StatisticsVisitor& visit, std::string_view header,
                               std::string_view cure) {
-    stream.clear();
-    stream.seekg(0);
+    rewind(stream, path);
     std::string line;
     // A last line without its newline is one that was being written.
     const auto next_line = [&] { return std::getline(stream, line) && !stream.eof(); };

@@ -316,9 +316,9 @@ int loop(Editor& editor, Report& report) {
 std::unique_ptr<SceneDocument> first_document(Editor& editor) {
     namespace fs = std::filesystem;
     if (editor.options.scene.empty()) return std::make_unique<SceneDocument>(first_scene_text());
+    // Nobody is there to be asked about what was left of a scene that is gone.
+    const bool is_alone = !editor.options.screenshot.empty();
     if (!fs::is_directory(editor.options.scene)) {
-        // Nobody is there to be asked about what was left of a scene that is gone.
-        const bool is_alone = !editor.options.screenshot.empty();
         return is_alone ? std::make_unique<SceneDocument>(editor.options.scene)
                         : SceneDocument::opened(editor.options.scene, editor.folder);
     }
@@ -330,7 +330,7 @@ std::unique_ptr<SceneDocument> first_document(Editor& editor) {
         if (entry.path().extension() == ".toml" && !is_hidden && entry.is_regular_file(error))
             scenes.push_back(entry.path());
         const std::string scene = scene_of_autosave(entry.path().filename());
-        if (!scene.empty() && !left_autosaves(editor.options.scene, scene).empty())
+        if (!is_alone && !scene.empty() && !left_autosaves(editor.options.scene, scene).empty())
             gone.push_back(editor.options.scene / scene);
     }
     if (scenes.empty()) scenes = std::move(gone);

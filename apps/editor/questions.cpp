@@ -28,13 +28,21 @@ std::string time_text(fs::file_time_type time) {
     return text;
 }
 
+// Of a scene whose file is gone, once all that was kept of it is answered.
+bool is_nothing_left(const Editor& editor) {
+    return editor.left_autosaves.empty() && editor.document->is_gone() && editor.document->text().empty();
+}
+
 // Takes the edits that an ended session left, into the scene, or those of a copy of it into a simulation beside it.
 void take_edits(Editor& editor, const LeftAutosave& found) {
     if (found.scene != editor.document->title()) {
         auto copy = std::make_unique<SceneDocument>(editor.document->saved_text(), found.scene,
                                                     editor.document->folder());
         copy->take_autosave(found);
-        if (!add_scene(editor, std::move(copy))) return;
+        if (is_nothing_left(editor))
+            open_document(editor, std::move(copy));
+        else if (!add_scene(editor, std::move(copy)))
+            return;
     } else {
         editor.document->take_autosave(found);
     }
@@ -131,9 +139,7 @@ void recovery_dialog(Editor& editor) {
     }
     if (takes) attempt(editor, [&] { take_edits(editor, found); });
     ImGui::EndPopup();
-    // Of a scene whose file is gone nothing is left then.
-    if (answered && editor.left_autosaves.empty() && editor.document->is_gone() &&
-        editor.document->text().empty())
+    if (answered && is_nothing_left(editor))
         open_document(editor, std::make_unique<SceneDocument>(first_scene_text()));
 }
 

@@ -218,10 +218,14 @@ std::vector<std::string> file_names(const ExportOptions& options,
 }
 
 // Writes and lists a file that is made of no density.
-void write_text_file(ExportList& list, const std::string& name, std::span<const std::byte> content,
-                     std::vector<std::string>& notes) {
+void write_text_file(const std::filesystem::path& folder, ExportList& list, const std::string& name,
+                     std::span<const std::byte> content, std::vector<std::string>& notes) {
     if (std::string note = list.note_on_change(name); !note.empty()) notes.push_back(std::move(note));
-    list.write_file(name, [&](const std::filesystem::path& path) { write_atomically(path, content); });
+    const auto write = [&](const std::filesystem::path& path) { write_atomically(path, content); };
+    if (list.has_begun_texts())
+        write(folder / name);
+    else
+        list.write_file(name, write);
     list.add_written(list.written_file(name, {}, {}));
 }
 
@@ -235,7 +239,7 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
     std::ranges::move(limit_notes(options.weather, frames), std::back_inserter(notes));
     const auto write_file = [&](std::string_view extension, std::span<const std::byte> content) {
         const std::string name = run.scene.name + std::string(extension);
-        write_text_file(list, name, content, notes);
+        write_text_file(options.folder, list, name, content, notes);
     };
     const auto write = [&](WeatherFormat format, std::span<const std::byte> content) {
         for (const NamedWeather& named : weather_formats())
@@ -292,7 +296,7 @@ void write_texts(const ExportOptions& options, const std::vector<ExportSequence>
                  std::vector<std::string>& notes) {
     if (!options.weather.empty()) write_weather(options, list, notes);
     const auto write = [&](const std::string& name, const std::string& text) {
-        write_text_file(list, name, std::as_bytes(std::span(text)), notes);
+        write_text_file(options.folder, list, name, std::as_bytes(std::span(text)), notes);
     };
     const std::vector<ExportFormat> formats = all_formats(options);
     for (std::size_t n = 0; n < sequences.size(); ++n) {
@@ -406,6 +410,8 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 return report;
             }
         }
+        list.begin_texts();
+        list.write(false);
         write_texts(options, sequences, figures, list, notes);
         lock.require_in_place();
         std::ranges::move(list.remove_left_over(), std::back_inserter(notes));

@@ -136,10 +136,12 @@ void claim(const std::filesystem::path& folder) {
 
 // Of a list, also a complete one: there may be files of an export that was killed, and in no list.
 constexpr const char* kUnlisted = "unlisted";
+// Of a list that is not complete: files without a source may be there unlisted.
+constexpr const char* kTextsBegun = "texts_begun";
 
 [[noreturn]] void throw_other(const std::filesystem::path& path) {
     throw Error(ErrorCode::usage, path.string() +
-                                      ": is there already, and no export of this has written it: move it "
+                                      ": is there already, and no export of this has listed it: move it "
                                       "away, or choose another folder");
 }
 
@@ -160,7 +162,9 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     for (const CheckedJson& file : CheckedJson(json, path).at("files").items())
         files.push_back(file_of(file));
     may_be_unlisted_ = !CheckedJson(json, path).at("complete").truth() || json.contains(kUnlisted);
-    json.erase(kUnlisted);
+    had_begun_texts_ = json.contains(kTextsBegun);
+    for (const char* key : {kUnlisted, kTextsBegun, "begun"})
+        json.erase(key);  // the last of an earlier version
     json.erase("files");
     json.erase("complete");
     json.erase(kSealKey);
@@ -212,9 +216,16 @@ void ExportList::write_file(const std::string& name,
     const std::string part = ".part" + std::to_string(::getpid()) + "-0";
     const std::filesystem::path made =
         folder_ / ("." + path.stem().string() + part + path.extension().string());
-    write(made);
-    const bool is_same = file_digest(made) == file_digest(path);
     std::error_code error;
+    bool is_same = false;
+    try {
+        if (type_at(path) != std::filesystem::file_type::regular) throw_other(path);  // it wrote no link
+        write(made);
+        is_same = file_digest(made) == file_digest(path);
+    } catch (...) {
+        std::filesystem::remove(made, error);
+        throw;
+    }
     std::filesystem::remove(made, error);
     if (!is_same) throw_other(path);
 }
@@ -263,6 +274,7 @@ void ExportList::write(bool complete) const {
         if (!complete && !listed.contains(path)) add(file);
     json["files"] = std::move(files);
     if (complete && may_be_unlisted_ && has_other_files()) json[kUnlisted] = true;
+    if (!complete && are_texts_begun_) json[kTextsBegun] = true;
     write_atomically(folder_ / "export.json",
                      std::string_view(sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace))));
 }

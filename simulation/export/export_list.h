@@ -39,6 +39,11 @@ class ExportList {
     std::optional<ExportedFile> kept_file(const std::string& name, const ExportSource& source) const;
     // Returns what is to be told of a file that is not as it was listed, and is about to be made again; empty: nothing. Thread-safe.
     std::string note_on_change(const std::string& name) const;
+    // From the next write() on, files without a source are known as those of this export, also should it be killed: what is in them
+    // depends on the frames that are asked for.
+    void begin_texts() { are_texts_begun_ = true; }
+    // Returns whether an earlier export had begun them.
+    bool has_begun_texts() const { return had_begun_texts_; }
     // Calls `write` with the path that it is to write. What stands there unlisted, after an export that was killed, stays, and is the
     // file, if `write` makes the same; otherwise it is somebody's. Thread-safe for different files. Throws Error(usage) naming it
     // then; exceptions of `write` pass through.
@@ -69,6 +74,7 @@ class ExportList {
     std::string head_;  // JSON of all but the files
     std::map<std::string, ExportedFile> earlier_;
     bool may_be_unlisted_ = false;  // files of an export that was killed
+    bool are_texts_begun_ = false, had_begun_texts_ = false;
     std::vector<ExportedFile> files_;
     std::size_t written_ = 0, kept_ = 0;
 };

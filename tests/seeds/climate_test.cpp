@@ -63,6 +63,7 @@ TEST(Climate, AnySchedule) {
     EXPECT_EQ(state_at(course, 10), 0.2);
     EXPECT_NEAR(state_at(course, 15), 0.5, 1e-15);
     EXPECT_EQ(state_at(course, 20), 0.8);
+    EXPECT_EQ(state_at({{{0, 0.8}, {100, 0.1}}}, 100), 0.1);  // and not one rounded twice
     EXPECT_NEAR(state_at(course, 35), 0.2, 1e-15);
     EXPECT_EQ(state_at(course, 1e9), 0.0);
     EXPECT_EQ(state_at(straight_schedule(0.3, 0.9, 0), 0), 0.9);

@@ -404,7 +404,7 @@ class Export(Case):
         folder = self.export("out", "--to", "raw", "--frames", "1..2")
         (folder / "placed_0003.raw").write_bytes(b"mine")
         (folder / "placed_0002.raw").write_bytes(b"edited")
-        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0003.raw: is there already, and no export of this has written it")
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0003.raw: is there already, and no export of this has listed it")
         self.assertEqual([(folder / f"placed_000{n}.raw").read_bytes() for n in (2, 3)], [b"edited", b"mine"])
         (folder / "placed_0003.raw").unlink()
         said = self.call("export", "run", "--to", "raw", "-o", "out").stderr
@@ -425,12 +425,19 @@ class Export(Case):
                 self.assertIn("placed_0003.raw is listed nowhere", self.call("verify", "out", status=1).stdout)
             own = (folder / "placed_0004.raw").read_bytes()
             (folder / "placed_0004.raw").write_bytes(b"mine")
-            self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0004.raw: is there already, and no export of this has written it")
+            self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0004.raw: is there already, and no export of this has listed it")
             self.assertEqual((folder / "placed_0004.raw").read_bytes(), b"mine")
             (folder / "placed_0004.raw").write_bytes(own)
             self.call("export", "run", "--to", "raw", "-o", "out")
             self.call("verify", "out")
             self.assertNotIn("unlisted", json.loads((folder / "export.json").read_text()))
+            # Killed after its first text, and then with other frames, of which that says something else.
+            listing = json.loads((folder / "export.json").read_text())
+            frames = [file for file in listing["files"] if "format" in file]
+            (folder / "export.json").write_text(unsealed({**listing, "complete": False, "texts_begun": True, "files": frames[:2]}))
+            (folder / "placed.volume.json").write_text("{}")
+            self.call("export", "run", "--to", "raw", "-o", "out")
+            self.call("verify", "out")
             self.assertEqual(sorted(path.name for path in folder.iterdir()), sorted(path.name for path in whole.iterdir()))
             shutil.rmtree(folder)
 

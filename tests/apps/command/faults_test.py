@@ -393,8 +393,8 @@ class Faults(Case):
                 self.write("other.csv", rows)
                 (self.folder / "other.csv").rename(table)
         for in_place in (True, False):
-            status, said = self.stopped_at("rename STOP 1 1", "checkpoint.nephos", lambda: changed(in_place), "run", self.scene, "--no-render", "--checkpoint",
-                                           "-q", "--out", "out")
+            status, said = self.stopped_at("rename STOP 1 1", "checkpoint.nephos", lambda: changed(in_place), "run", self.scene, "--no-render", "-q",
+                                           "--out", "out")
             self.assertEqual(status, 3, said)
             self.assertIn("statistics.csv: was changed while the run was writing it", said)
             self.assertFalse(json.loads((self.folder / "out/manifest.json").read_text())["complete"])

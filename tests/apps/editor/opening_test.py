@@ -141,9 +141,15 @@ class Opening(Kept):
         left = scene.parent / ".a.toml.autosave"
         left.write_text(STATE, encoding="utf-8")
         self.edit(scene, "--screenshot", "p.png", status=3)
+        self.edit(scene.parent, "--screenshot", "p.png", status=2)
+        self.assertFalse((self.folder / "p.png").exists())
         self.edit(scene, script='wait 1\nclick "Delete them"\nwait 6\nwait-step 1\nkey CTRL+Q\nwait 0.5\n')
         self.assertEqual(list(scene.parent.iterdir()), [])
         self.edit(scene.parent, status=2)
+        # Of a copy alone: nothing is asked of the scene itself, which is nowhere.
+        (scene.parent / ".a-2.toml.autosave").write_text(STATE, encoding="utf-8")
+        self.edit(scene, script=self.TAKE.replace("key CTRL+S\nwait 0.5\n", 'key CTRL+Q\nwait 0.5\nexpect-control "unsaved a-2.toml"\nclick "Discard them"\nwait 0.5\n'))
+        self.assertFalse(scene.exists())
 
     def test_a_file_that_cannot_be_opened_ends_a_drop(self):
         """Those behind it are not opened without a word."""
