@@ -59,7 +59,7 @@ std::string Digest::hex() const { return hex_of(XXH3_128bits_digest(state_->xxh3
 
 namespace {
 
-// Of at most so many bytes that `read` gives, which fills a piece from its front and returns how many it has; 0: the end.
+// Returns the checksum of at most so many bytes. `read` fills a piece from its front and returns how many it has; 0: the end.
 template <typename Read>
 FileDigest digest_of_pieces(std::uint64_t most, const Read& read) {
     std::vector<std::byte> piece(kPieceBytes);

@@ -238,7 +238,7 @@ std::vector<std::filesystem::path> RunRecorder::run_files() const {
     return files;
 }
 
-// Of a table what was written, and not what may have become of it since.
+// Returns of a table what was written, and not what may have become of it since.
 FileDigest RunRecorder::digest_of_run_file(const std::filesystem::path& path) const {
     if (path == folder_.statistics()) return statistics_->content();
     for (std::size_t n = 0; n < layer_statistics_.size(); ++n)

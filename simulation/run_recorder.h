@@ -100,8 +100,9 @@ class RunRecorder : public SimulationSink {
     // Lists the files that belong to no frame, all but the manifest.
     std::vector<std::filesystem::path> run_files() const;
 
-    // For frames of a run whose manifest, of an earlier version, names no digests.
     FileDigest digest_of_run_file(const std::filesystem::path& path) const;
+
+    // For frames of a run whose manifest, of an earlier version, names no digests.
     std::vector<FileRecord> digests_of_frame(int number) const;
 
     // By the thread that writes.

@@ -28,7 +28,7 @@ std::string time_text(fs::file_time_type time) {
     return text;
 }
 
-// Of a scene whose file is gone, once all that was kept of it is answered.
+// Returns true for a scene whose file is gone, once all that was kept of it is answered.
 bool is_nothing_left(const Editor& editor) {
     return editor.left_autosaves.empty() && editor.document->is_gone() && editor.document->text().empty();
 }

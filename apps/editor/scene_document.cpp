@@ -257,7 +257,7 @@ fs::path SceneDocument::autosave_folder(const fs::path& folder) const {
     return folder_.empty() ? folder : folder_;
 }
 
-// Of its edits in another folder.
+// Returns the name of the file of its edits in another folder.
 std::string SceneDocument::name_elsewhere() const { return coded(real_folder_) + "%%" + title(); }
 
 void SceneDocument::autosave(const fs::path& folder, const std::string& now) {

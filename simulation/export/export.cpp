@@ -191,7 +191,7 @@ class GridReader {
 std::string sidecar_name(const ExportSequence& s) { return s.name + ".volume.json"; }
 std::string pvd_name(const ExportSequence& s) { return s.name + ".pvd"; }
 
-// Of all layers together.
+// Returns the name of the scene of all layers together.
 std::string usd_name(const std::vector<ExportSequence>& sequences) {
     const std::string &name = sequences.front().name, &layer = sequences.front().layer;
     return (layer.empty() ? name : name.substr(0, name.size() - layer.size() - 1)) + ".usda";
@@ -199,7 +199,7 @@ std::string usd_name(const std::vector<ExportSequence>& sequences) {
 
 constexpr const char* kReadme = "README.txt";
 
-// Of all files but summaries of weather.
+// Returns the names of all files but summaries of weather.
 std::vector<std::string> file_names(const ExportOptions& options,
                                     const std::vector<ExportSequence>& sequences) {
     std::vector<std::string> names{kReadme};

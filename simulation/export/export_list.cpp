@@ -134,9 +134,9 @@ void claim(const std::filesystem::path& folder) {
     if (error) throw Error(ErrorCode::io, folder.string() + ": cannot be examined: " + error.message());
 }
 
-// Of a list, also a complete one: there may be files of an export that was killed, and in no list.
+// Marks a list, also a complete one: there may be files of an export that was killed, and in no list.
 constexpr const char* kUnlisted = "unlisted";
-// Of a list that is not complete: files without a source may be there unlisted.
+// Marks a list that is not complete: files without a source may be there unlisted.
 constexpr const char* kTextsBegun = "texts_begun";
 
 [[noreturn]] void throw_other(const std::filesystem::path& path) {
