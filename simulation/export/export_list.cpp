@@ -274,7 +274,7 @@ void ExportList::write(bool complete) const {
         if (!complete && !listed.contains(path)) add(file);
     json["files"] = std::move(files);
     if (complete && may_be_unlisted_ && has_other_files()) json[kUnlisted] = true;
-    if (!complete && are_texts_begun_) json[kTextsBegun] = true;
+    if (!complete && (are_texts_begun_ || had_begun_texts_)) json[kTextsBegun] = true;
     write_atomically(folder_ / "export.json",
                      std::string_view(sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace))));
 }
