@@ -30,8 +30,6 @@
 namespace nephos {
 namespace {
 
-constexpr std::size_t kListEvery = 16;  // frames
-
 void check_options(const ExportOptions& o) {
     if (o.formats.empty() && o.weather.empty())
         throw Error(ErrorCode::usage, "neither --to nor --for says which files to write");
@@ -197,12 +195,20 @@ std::string usd_name(const std::vector<ExportSequence>& sequences) {
     return (layer.empty() ? name : name.substr(0, name.size() - layer.size() - 1)) + ".usda";
 }
 
-constexpr const char* kReadme = "README.txt";
+constexpr const char *kReadme = "README.txt", *kPackets = ".cigi";
 
-// Returns the names of all files but summaries of weather.
+// Returns the names of all files.
 std::vector<std::string> file_names(const ExportOptions& options,
                                     const std::vector<ExportSequence>& sequences) {
     std::vector<std::string> names{kReadme};
+    if (!options.weather.empty()) {
+        const std::string scene = read_run(options.source).scene.name;
+        for (const NamedWeather& named : weather_formats()) {
+            if (std::ranges::count(options.weather, named.format) == 0) continue;
+            names.push_back(scene + std::string(named.extension));
+            if (named.format == WeatherFormat::cigi) names.push_back(scene + kPackets);
+        }
+    }
     for (const ExportFormat format : all_formats(options)) {
         if (format == ExportFormat::usd) {
             names.push_back(usd_name(sequences));
@@ -218,15 +224,11 @@ std::vector<std::string> file_names(const ExportOptions& options,
 }
 
 // Writes and lists a file that is made of no density.
-void write_text_file(const std::filesystem::path& folder, ExportList& list, const std::string& name,
-                     std::span<const std::byte> content, std::vector<std::string>& notes) {
+void write_text_file(ExportList& list, const std::string& name, std::span<const std::byte> content,
+                     std::vector<std::string>& notes) {
     if (std::string note = list.note_on_change(name); !note.empty()) notes.push_back(std::move(note));
-    const auto write = [&](const std::filesystem::path& path) { write_atomically(path, content); };
-    if (list.has_begun_texts())
-        write(folder / name);
-    else
-        list.write_file(name, write);
-    list.add_written(list.written_file(name, {}, {}));
+    list.add_written(list.write_file(
+        name, {}, {}, [&](const std::filesystem::path& path) { write_atomically(path, content); }));
 }
 
 // The summaries of a run's layers, in all forms that are wanted.
@@ -239,7 +241,7 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
     std::ranges::move(limit_notes(options.weather, frames), std::back_inserter(notes));
     const auto write_file = [&](std::string_view extension, std::span<const std::byte> content) {
         const std::string name = run.scene.name + std::string(extension);
-        write_text_file(options.folder, list, name, content, notes);
+        write_text_file(list, name, content, notes);
     };
     const auto write = [&](WeatherFormat format, std::span<const std::byte> content) {
         for (const NamedWeather& named : weather_formats())
@@ -270,7 +272,7 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
                 std::vector<std::byte> packets;
                 for (const WeatherSummary& frame : frames)
                     std::ranges::copy(cigi_packets(frame), std::back_inserter(packets));
-                write_file(".cigi", packets);
+                write_file(kPackets, packets);
                 break;
             }
         }
@@ -296,7 +298,7 @@ void write_texts(const ExportOptions& options, const std::vector<ExportSequence>
                  std::vector<std::string>& notes) {
     if (!options.weather.empty()) write_weather(options, list, notes);
     const auto write = [&](const std::string& name, const std::string& text) {
-        write_text_file(options.folder, list, name, std::as_bytes(std::span(text)), notes);
+        write_text_file(list, name, std::as_bytes(std::span(text)), notes);
     };
     const std::vector<ExportFormat> formats = all_formats(options);
     for (std::size_t n = 0; n < sequences.size(); ++n) {
@@ -363,12 +365,10 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                             "(--range auto keeps them)",
                             s.frames[of.size()].file.string(), frame.figures.max, s.scale));
         of.push_back(frame.figures);
-        if (++done % kListEvery != 0) return;
-        lock.require_in_place();
-        list.write(false);
+        ++done;
     };
     try {
-        list.write(false);  // the folder is known as that of an export, whenever this one is killed
+        list.begin();
         for (std::size_t n = 0; n < sequences.size(); ++n) {
             ExportSequence& s = sequences[n];
             if (all_formats(options).empty()) break;
@@ -405,21 +405,19 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
             if (progress && !stopped) progress(done, frames);
             lock.require_in_place();
             if (stopped) {
-                list.write(false);
+                list.end(false);
                 report.notes = std::move(notes);
                 return report;
             }
         }
-        list.begin_texts();
-        list.write(false);
         write_texts(options, sequences, figures, list, notes);
         lock.require_in_place();
         std::ranges::move(list.remove_left_over(), std::back_inserter(notes));
-        list.write(true);
+        list.end(true);
     } catch (...) {
         // What failed in a folder that is gone failed for that; and nothing may be listed in a new one of its name.
         lock.require_in_place();
-        list.write_quietly();
+        list.end_quietly();
         throw;
     }
     report.notes = std::move(notes);

@@ -92,7 +92,9 @@ std::string format_name_of(const CheckedJson& json) {
     json.fail("one of " + names);
 }
 
-ExportedFile file_of(const CheckedJson& json) {
+}  // namespace
+
+ExportedFile exported_file(const CheckedJson& json) {
     ExportedFile file;
     file.path = json.at("path").text();
     file.digest = {std::uint64_t(json.at("bytes").integer(0, kMostBytes)), json.at("xxh3").text()};
@@ -106,6 +108,8 @@ ExportedFile file_of(const CheckedJson& json) {
                               json.at("source_xxh3").text()};
     return file;
 }
+
+namespace {
 
 Json parsed_list(const std::filesystem::path& path) {
     Json json = parsed_json(path);
@@ -122,6 +126,7 @@ void claim(const std::filesystem::path& folder) {
     std::error_code error;
     std::vector<std::filesystem::path> leftovers;
     for (const std::string& name : names_in_folder(folder)) {
+        if (name == kExportWork) continue;  // ExportWork::begin() removes it
         if (!published_name(name).empty()) {
             leftovers.push_back(folder / name);
         } else if (!is_export_folder(folder)) {
@@ -134,17 +139,6 @@ void claim(const std::filesystem::path& folder) {
     if (error) throw Error(ErrorCode::io, folder.string() + ": cannot be examined: " + error.message());
 }
 
-// Marks a list, also a complete one: there may be files of an export that was killed, and in no list.
-constexpr const char* kUnlisted = "unlisted";
-// Marks a list that is not complete: files without a source may be there unlisted.
-constexpr const char* kTextsBegun = "texts_begun";
-
-[[noreturn]] void throw_other(const std::filesystem::path& path) {
-    throw Error(ErrorCode::usage, path.string() +
-                                      ": is there already, and no export of this has listed it: move it "
-                                      "away, or choose another folder");
-}
-
 }  // namespace
 
 bool is_export_folder(const std::filesystem::path& folder) {
@@ -152,7 +146,7 @@ bool is_export_folder(const std::filesystem::path& folder) {
 }
 
 ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences)
-    : folder_(options.folder) {
+    : folder_(options.folder), work_(options.folder) {
     head_ = head_json(options, sequences).dump(2, ' ', false, Json::error_handler_t::replace);
     claim(folder_);
     if (!is_export_folder(folder_)) return;
@@ -160,11 +154,7 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     Json json = parsed_list(path);
     std::vector<ExportedFile> files;
     for (const CheckedJson& file : CheckedJson(json, path).at("files").items())
-        files.push_back(file_of(file));
-    may_be_unlisted_ = !CheckedJson(json, path).at("complete").truth() || json.contains(kUnlisted);
-    had_begun_texts_ = json.contains(kTextsBegun);
-    for (const char* key : {kUnlisted, kTextsBegun, "begun"})
-        json.erase(key);  // the last of an earlier version
+        files.push_back(exported_file(file));
     json.erase("files");
     json.erase("complete");
     json.erase(kSealKey);
@@ -174,18 +164,24 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
                         ": holds an export with other options or of another scene: choose another folder");
     for (ExportedFile& file : files) {
         std::string name = file.path.generic_string();
-        earlier_.emplace(std::move(name), std::move(file));
+        if (stands_there(folder_ / name)) earlier_.emplace(std::move(name), std::move(file));
+    }
+    for (ExportedFile& file : noted_files(folder_)) {
+        std::string name = file.path.generic_string();
+        if (type_behind(folder_ / name) == std::filesystem::file_type::regular &&
+            file_digest(folder_ / name) == file.digest)
+            earlier_[std::move(name)] = std::move(file);
     }
 }
 
-bool ExportList::is_other(const std::string& name) const {
-    return !earlier_.contains(name) && stands_there(folder_ / name);
+void ExportList::require_free(const std::vector<std::string>& names) const {
+    for (const std::string& name : names)
+        if (!earlier_.contains(name) && stands_there(folder_ / name)) throw_place_taken(folder_ / name);
 }
 
-void ExportList::require_free(const std::vector<std::string>& names) const {
-    if (may_be_unlisted_) return;
-    for (const std::string& name : names)
-        if (is_other(name)) throw_other(folder_ / name);
+void ExportList::begin() {
+    write(false);
+    work_.begin();
 }
 
 std::optional<ExportedFile> ExportList::kept_file(const std::string& name, const ExportSource& source) const {
@@ -208,31 +204,17 @@ std::string ExportList::note_on_change(const std::string& name) const {
     return path.string() + ": is not as an earlier export had listed it, and is made again";
 }
 
-void ExportList::write_file(const std::string& name,
-                            const std::function<void(const std::filesystem::path& path)>& write) const {
-    const std::filesystem::path path = folder_ / name;
-    if (!is_other(name)) return write(path);
-    // A name that claim() takes for a leftover, should this be killed.
-    const std::string part = ".part" + std::to_string(::getpid()) + "-0";
-    const std::filesystem::path made =
-        folder_ / ("." + path.stem().string() + part + path.extension().string());
-    std::error_code error;
-    bool is_same = false;
-    try {
-        if (type_at(path) != std::filesystem::file_type::regular) throw_other(path);  // it wrote no link
-        write(made);
-        is_same = file_digest(made) == file_digest(path);
-    } catch (...) {
-        std::filesystem::remove(made, error);
-        throw;
-    }
-    std::filesystem::remove(made, error);
-    if (!is_same) throw_other(path);
-}
-
-ExportedFile ExportList::written_file(const std::string& name, const ExportSource& source,
-                                      std::string_view format) const {
-    return {name, file_digest(folder_ / name), below_folder(source.path), std::string(format), source.digest};
+ExportedFile ExportList::write_file(const std::string& name, const ExportSource& source,
+                                    std::string_view format,
+                                    const std::function<void(const std::filesystem::path& path)>& write) {
+    const bool is_listed = earlier_.contains(name) && stands_there(folder_ / name);
+    const std::filesystem::path path = is_listed ? folder_ / name : work_.path_of(name);
+    write(path);
+    ExportedFile file{name, file_digest(path), below_folder(source.path), std::string(format), source.digest};
+    if (!is_listed) work_.publish(file);
+    const std::scoped_lock lock(mutex_);
+    made_[name] = file;
+    return file;
 }
 
 void ExportList::add_kept(ExportedFile file) {
@@ -255,36 +237,26 @@ void ExportList::write(bool complete) const {
     Json json = Json::parse(head_);
     json["complete"] = complete;
     Json files = Json::array();
-    const auto add = [&files](const ExportedFile& file) {
-        Json entry = {
-            {"path", file.path.generic_string()}, {"bytes", file.digest.bytes}, {"xxh3", file.digest.xxh3}};
-        if (!file.source.empty()) entry.update(Json{{"format", file.format}, {"source", file.source}});
-        if (file.source_digest)
-            entry.update(
-                Json{{"source_bytes", file.source_digest->bytes}, {"source_xxh3", file.source_digest->xxh3}});
-        files.push_back(std::move(entry));
-    };
     std::set<std::string> listed;
-    for (const ExportedFile& file : files_) {
-        add(file);
-        listed.insert(file.path.generic_string());
+    const auto add = [&](const std::string& name, const ExportedFile& file) {
+        if (listed.insert(name).second) files.push_back(export_entry(file));
+    };
+    for (const ExportedFile& file : files_) add(file.path.generic_string(), file);
+    if (!complete) {
+        for (const auto& [name, file] : made_) add(name, file);
+        // What an earlier export wrote is not to be written again after a second interruption.
+        for (const auto& [name, file] : earlier_) add(name, file);
     }
-    // What an earlier export wrote is not to be written again after a second interruption.
-    for (const auto& [path, file] : earlier_)
-        if (!complete && !listed.contains(path)) add(file);
     json["files"] = std::move(files);
-    if (complete && may_be_unlisted_ && has_other_files()) json[kUnlisted] = true;
-    if (!complete && (are_texts_begun_ || had_begun_texts_)) json[kTextsBegun] = true;
     write_atomically(folder_ / "export.json",
                      std::string_view(sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace))));
 }
 
-bool ExportList::has_other_files() const {
-    std::set<std::string> listed{"export.json"};
-    for (const ExportedFile& file : files_) listed.insert(file.path.generic_string());
-    return std::ranges::any_of(names_in_folder(folder_), [&](const std::string& name) {
-        return !listed.contains(name) && published_name(name).empty();
-    });
+void ExportList::end(bool complete) {
+    work_.flush();
+    write(false);
+    work_.end();
+    if (complete) write(true);  // the last of all: nothing is in the folder that it does not list
 }
 
 std::vector<std::string> ExportList::remove_left_over() const {
@@ -315,9 +287,9 @@ std::vector<std::string> ExportList::remove_left_over() const {
 }
 
 // After a failure, whose message is the one to show.
-void ExportList::write_quietly() const noexcept {
+void ExportList::end_quietly() noexcept {
     try {
-        write(false);
+        end(false);
     } catch (const std::exception&) {
     }
 }
@@ -328,7 +300,7 @@ ListedExport read_export(const std::filesystem::path& folder) {
     const CheckedJson root(json, path);
     ListedExport list;
     list.complete = root.at("complete").truth();
-    for (const CheckedJson& file : root.at("files").items()) list.files.push_back(file_of(file));
+    for (const CheckedJson& file : root.at("files").items()) list.files.push_back(exported_file(file));
     for (const CheckedJson& s : root.at("sequences").items())
         list.sequences.push_back({s.at("name").text(), layout_of(s.at("layout")),
                                   int(s.at("levels").integer(1, kMostLevels)),

@@ -6,17 +6,19 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <nlohmann/json_fwd.hpp>
-
 #include "core/error.h"
 #include "simulation/export/export.h"
+#include "simulation/export/export_work.h"
 #include "simulation/export/sequence.h"
 
 namespace nephos {
+
+class CheckedJson;
 
 // What a file of an export is made of: a density file, or nothing for texts.
 struct ExportSource {
@@ -28,53 +30,50 @@ class ExportList {
   public:
     // Takes over the list of an earlier export with the same options into the folder, which must be there, and removes the
     // temporary files of one that was killed: for the holder of the folder's lock alone. Throws Error(usage) when the folder
-    // holds an export with other options, or a file without a list; Error(io) when the list is damaged.
+    // holds an export with other options, or a file without a list, or as ExportWork(); Error(io) when the list is damaged.
     ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
 
-    // Throws Error(usage) naming the first of these files that is there and that no export has written, where that is known: not
-    // where one was killed, which may have left files that it had not listed yet.
+    // Throws Error(usage) naming the first of these files that is there and that no export has written.
     void require_free(const std::vector<std::string>& names) const;
+    // Writes the list, which says that it is not complete, and makes ready for files: from here on the folder is known as that of
+    // an export. Throws Error(io).
+    void begin();
     // Returns the entry of a file that is there as it was listed, and was made of this source: it need not be written
     // again. Thread-safe.
     std::optional<ExportedFile> kept_file(const std::string& name, const ExportSource& source) const;
     // Returns what is to be told of a file that is not as it was listed, and is about to be made again; empty: nothing. Thread-safe.
     std::string note_on_change(const std::string& name) const;
-    // From the next write() on, files without a source are known as those of this export, also should it be killed: what is in them
-    // depends on the frames that are asked for.
-    void begin_texts() { are_texts_begun_ = true; }
-    // Returns whether an earlier export had begun them.
-    bool has_begun_texts() const { return had_begun_texts_; }
-    // Calls `write` with the path that it is to write. What stands there unlisted, after an export that was killed, stays, and is the
-    // file, if `write` makes the same; otherwise it is somebody's. Thread-safe for different files. Throws Error(usage) naming it
-    // then; exceptions of `write` pass through.
-    void write_file(const std::string& name,
-                    const std::function<void(const std::filesystem::path& path)>& write) const;
-    // Returns the entry of a file that was written, with its checksum. Thread-safe. Throws Error(io).
-    ExportedFile written_file(const std::string& name, const ExportSource& source, std::string_view format) const;
+    // Calls `write` with the path that it is to write, and returns the entry of the file, with its checksum. One that is listed is
+    // written in its place; another is noted before it gets its place (ExportWork), in which nothing may stand. Thread-safe for
+    // different files. Throws Error(usage) naming what stands there, Error(io); exceptions of `write` pass through.
+    ExportedFile write_file(const std::string& name, const ExportSource& source, std::string_view format,
+                            const std::function<void(const std::filesystem::path& path)>& write);
     // List a file; those of frames in their order.
     void add_kept(ExportedFile file);
     void add_written(ExportedFile file);
     // Removes what an earlier export wrote and this one does not list, so that the folder holds what was asked for last; but not
     // what somebody changed since. Returns what is to be told of that. Throws Error(io).
     std::vector<std::string> remove_left_over() const;
-    // Writes the list. Throws Error(io).
-    void write(bool complete) const;
-    void write_quietly() const noexcept;
+    // Writes the list, of one that is not complete with what was written beyond it and what an earlier one had listed, and ends the
+    // work. Nothing is written after it. Throws Error(io).
+    void end(bool complete);
+    void end_quietly() noexcept;
 
     const std::vector<ExportedFile>& files() const { return files_; }
     std::size_t written() const { return written_; }
     std::size_t kept() const { return kept_; }
 
   private:
-    bool is_other(const std::string& name) const;
-    bool has_other_files() const;
+    void write(bool complete) const;
     std::string below_folder(const std::filesystem::path& source) const;
 
     std::filesystem::path folder_;
     std::string head_;  // JSON of all but the files
-    std::map<std::string, ExportedFile> earlier_;
-    bool may_be_unlisted_ = false;  // files of an export that was killed
-    bool are_texts_begun_ = false, had_begun_texts_ = false;
+    ExportWork work_;
+    std::map<std::string, ExportedFile> earlier_;  // what was there, by its name
+    std::map<std::string, ExportedFile>
+        made_;          // what this one has written, also of frames whose turn has not come
+    std::mutex mutex_;  // of made_
     std::vector<ExportedFile> files_;
     std::size_t written_ = 0, kept_ = 0;
 };
@@ -96,6 +95,9 @@ struct ListedExport {
     int brick_edge = 32;
     std::string grid;
 };
+
+// Reads the entry of a file in a list. Throws Error(io) naming the value that is not what it must be.
+ExportedFile exported_file(const CheckedJson& json);
 
 // Returns the sequence of a listed file by its name; null where it is of none.
 const ListedExport::Sequence* sequence_of(const ListedExport& list, const std::string& name);

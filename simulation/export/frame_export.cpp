@@ -147,15 +147,12 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
         }
         if (std::string note = list_.note_on_change(name); !note.empty())
             result.notes.push_back(std::move(note));
-        list_.write_file(name, [&](const std::filesystem::path& path) {
-            write_format(path, format, s, frame, loaded, source, made);
-        });
-        ExportedFile file = list_.written_file(name, source, name_of(format));
-        if (format == ExportFormat::vdb && is_copy(options_, s, frame, source) &&
-            !(file.digest == source.digest))
-            throw Error(ErrorCode::io,
-                        frame.file.string() + ": was changed while it was exported: export it again");
-        result.files.push_back({std::move(file), false});
+        result.files.push_back({list_.write_file(name, source, name_of(format),
+                                                 [&](const std::filesystem::path& path) {
+                                                     write_format(path, format, s, frame, loaded, source,
+                                                                  made);
+                                                 }),
+                                false});
     }
     return result;
 }
@@ -164,8 +161,12 @@ void FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
                                  const ExportSequence& s, const SourceFrame& frame,
                                  const LoadedDensity& loaded, const ExportSource& source,
                                  Encodings& made) const {
-    if (format == ExportFormat::vdb && is_copy(options_, s, frame, source))
-        return copy_atomically(frame.file, path);
+    if (format == ExportFormat::vdb && is_copy(options_, s, frame, source)) {
+        copy_atomically(frame.file, path);
+        if (file_digest(path) == source.digest) return;
+        throw Error(ErrorCode::io,
+                    frame.file.string() + ": was changed while it was exported: export it again");
+    }
     if (format == ExportFormat::vdb) return write_vdb_file(path, options_, s, loaded, frame.time_s);
     if (format == ExportFormat::flightgear) {
         VolumeLayout layout;

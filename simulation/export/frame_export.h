@@ -33,7 +33,7 @@ struct ExportedFrame {
 // Writes the files of one frame that are not there yet. Thread-safe for different frames.
 class FrameExporter {
   public:
-    FrameExporter(const ExportOptions& options, const ExportList& list) : options_(options), list_(list) {}
+    FrameExporter(const ExportOptions& options, ExportList& list) : options_(options), list_(list) {}
 
     // Throws Error(io) when the frame has another box than its sequence, or a file cannot be written.
     ExportedFrame write(const ExportSequence& s, const SourceFrame& frame, const LoadedDensity& loaded) const;
@@ -52,7 +52,7 @@ class FrameExporter {
                      const SourceFrame& frame, const EncodedVolume& encoded) const;
 
     const ExportOptions& options_;
-    const ExportList& list_;
+    ExportList& list_;
 };
 
 // Frames that are written at the same time, so that one is encoded while another is read and a third is flushed to the

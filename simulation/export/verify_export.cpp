@@ -241,7 +241,7 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
     }
     std::vector<std::filesystem::path> extra;
     for (const std::string& name : names_in_folder(folder))
-        if (!names.contains(name)) extra.emplace_back(name);
+        if (!names.contains(name) && (list.complete || name != kExportWork)) extra.emplace_back(name);
     for (Check& check : check_files(folder, files, extra)) result.checks.push_back(std::move(check));
     if (!options.hashes_only) {
         for (Check& check : check_sidecars(folder, list)) result.checks.push_back(std::move(check));

@@ -3,7 +3,7 @@
 //
 //     FAIL_CALL="NAME HOW FIRST COUNT"  of the calls NAME, numbered from 1 among those that FAIL_PATH allows, COUNT fail
 //                                       from FIRST on. NAME: open, read, write (with pwrite, writev), lseek, fsync (with
-//                                       fdatasync), rename (with renameat), mkdir, stat (with lstat, fstat, fstatat), mmap, or
+//                                       fdatasync), rename (with renameat, renameat2), mkdir, stat (with lstat, fstat, fstatat), mmap, or
 //                                       allocate (memory of 32 KiB or more). HOW: an error (EIO, EINTR, ENOSPC, EACCES,
 //                                       EMFILE, ENOMEM), KILL, STOP (until SIGCONT; the call does not fail), SHORT (of read
 //                                       and write: half of the bytes), or COUNT (a byte into the file FAIL_COUNT for each)
@@ -244,6 +244,11 @@ int rename(const char* from, const char* to) noexcept {
 int renameat(int from_folder, const char* from, int to_folder, const char* to) noexcept {
     return fails_at("rename", to_folder, to) ? -1
                                              : next(&renameat, "renameat")(from_folder, from, to_folder, to);
+}
+int renameat2(int from_folder, const char* from, int to_folder, const char* to, unsigned flags) noexcept {
+    return fails_at("rename", to_folder, to)
+               ? -1
+               : next(&renameat2, "renameat2")(from_folder, from, to_folder, to, flags);
 }
 int mkdir(const char* path, mode_t mode) noexcept {
     return fails_at("mkdir", AT_FDCWD, path) ? -1 : next(&mkdir, "mkdir")(path, mode);

@@ -126,7 +126,7 @@ class Injection(unittest.TestCase):
     def whole_or_absent(self, complete):
         """Whatever stands under a final name; all of it when `complete`."""
         expected, found, before = self.files("undisturbed"), self.files("out"), self.files("before")
-        names = {name for name in found if not pathlib.Path(name).name.startswith(".")}
+        names = {name for name in found if not any(part.startswith(".") for part in pathlib.Path(name).parts)}
         self.assertLessEqual(names, set(expected))
         if complete:
             self.assertEqual(names, set(expected))

@@ -411,35 +411,81 @@ class Export(Case):
         self.assertIn("placed_0002.raw: is not as an earlier export had listed it, and is made again", said)
         self.call("verify", "out")
 
-    def test_files_of_a_killed_export_are_told_from_others(self):
-        """It may have left some that it had not listed: what is the same is one of these, also after a smaller export."""
-        whole = self.export("whole", "--to", "raw")
-        for between in ([], ["--frames", "1..2"]):
-            folder = self.export("out", "--to", "raw", "--frames", "1")
-            listing = json.loads((folder / "export.json").read_text())
-            (folder / "export.json").write_text(unsealed({**listing, "complete": False}))
-            for number in (3, 4):
-                shutil.copy(whole / f"placed_000{number}.raw", folder)
-            if between:
-                self.call("export", "run", "--to", "raw", *between, "-o", "out")
-                self.assertIn("placed_0003.raw is listed nowhere", self.call("verify", "out", status=1).stdout)
-            own = (folder / "placed_0004.raw").read_bytes()
-            (folder / "placed_0004.raw").write_bytes(b"mine")
-            self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0004.raw: is there already, and no export of this has listed it")
-            self.assertEqual((folder / "placed_0004.raw").read_bytes(), b"mine")
-            (folder / "placed_0004.raw").write_bytes(own)
-            self.call("export", "run", "--to", "raw", "-o", "out")
-            self.call("verify", "out")
-            self.assertNotIn("unlisted", json.loads((folder / "export.json").read_text()))
-            # Killed after its first text, and then with other frames, of which that says something else.
-            listing = json.loads((folder / "export.json").read_text())
-            frames = [file for file in listing["files"] if "format" in file]
-            (folder / "export.json").write_text(unsealed({**listing, "complete": False, "texts_begun": True, "files": frames[:2]}))
-            (folder / "placed.volume.json").write_text("{}")
-            self.call("export", "run", "--to", "raw", "-o", "out")
-            self.call("verify", "out")
-            self.assertEqual(sorted(path.name for path in folder.iterdir()), sorted(path.name for path in whole.iterdir()))
-            shutil.rmtree(folder)
+    KINDS = (["--for", "blender"], ["--for", "unreal"], ["--to", "vdb", "--voxel", "200"], ["--to", "raw", "--to", "layers", "--to", "cigi"],
+             ["--to", "usd", "--to", "vdb"], ["--to", "nvdb"], ["--to", "vti"], ["--for", "flightgear"])
+
+    def killed(self, call, first, path, *arguments):
+        """An export that is killed at a call of the system on files with this in their path."""
+        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"{call} KILL {first} 1", "FAIL_PATH": path}
+        done = subprocess.run([NEPHOS, "export", "run", *arguments], cwd=self.folder, env=environment, capture_output=True, check=False)
+        self.assertEqual(done.returncode, -signal.SIGKILL, done.stderr)
+
+    def test_a_killed_export_knows_its_files(self):
+        """It goes on, whatever it writes and wherever it was killed, and what is there in the end is what an undisturbed one has written."""
+        for kind, arguments in enumerate(self.KINDS):
+            whole = self.export(f"whole-{kind}", *arguments)
+            for call, first, path in (("rename", 3, "placed_"), ("rename", 4, "placed_"), ("rename", 1, "README"), ("fsync", 2, "notes")):
+                out = self.folder / f"out-{kind}-{call}-{first}"
+                self.killed(call, first, path, *arguments, "-o", out)
+                self.call("export", "run", *arguments, "-o", out)
+                self.assertEqual({file.name: file.read_bytes() for file in out.iterdir()}, {file.name: file.read_bytes() for file in whole.iterdir()}, out)
+                shutil.rmtree(out)
+
+    def test_a_killed_export_takes_no_file_of_others_for_its_own(self):
+        """Volumes, texts and weather that somebody put where it had not come to, as a file or a link, stay, however often it is called."""
+        arguments = ["--to", "raw", "--to", "layers", "-o", "out"]
+        folder, elsewhere = self.folder / "out", self.folder / "diary.txt"
+        elsewhere.write_text("mine")
+        for call, first, path in (("rename", 3, "placed_"), ("rename", 1, "README")):
+            for name in ("README.txt", "placed.layers.json", "placed_0004.raw"):
+                for is_link in (False, True):
+                    self.killed(call, first, path, *arguments)
+                    left = folder / name
+                    if left.exists():  # it had come to this one
+                        shutil.rmtree(folder)
+                        continue
+                    left.symlink_to(elsewhere) if is_link else left.write_text("mine")
+                    for _ in range(3):
+                        self.refused(2, "export", "run", *arguments, says=f"{name}: is there already, and no export of this has listed it")
+                        self.assertEqual((left.read_text(), elsewhere.read_text(), left.is_symlink()), ("mine", "mine", is_link))
+                    left.unlink()
+                    self.call("export", "run", *arguments)
+                    self.call("verify", "out")
+                    shutil.rmtree(folder)
+
+    def test_what_an_export_refuses_leaves_the_one_before_complete(self):
+        folder = self.export("out", "--to", "raw")
+        before = {path.name: path.read_bytes() for path in folder.iterdir()}
+        (folder / "placed.layers.json").write_text("mine")
+        for _ in range(2):
+            self.refused(2, "export", "run", "--to", "raw", "--to", "layers", "-o", "out", says="placed.layers.json: is there already")
+        (folder / "placed.layers.json").unlink()
+        self.assertEqual({path.name: path.read_bytes() for path in folder.iterdir()}, before)
+        self.call("verify", "out")
+        (folder / ".nephos-export").symlink_to(self.folder)  # its own hidden folder
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
+        self.assertIn("listed nowhere", self.call("verify", "out", status=1).stdout)
+        (folder / ".nephos-export").unlink()
+        self.call("verify", "out")
+
+    def test_files_that_are_put_there_meanwhile_stay(self):
+        """Under a name that was free when the export began."""
+        self.call("run", self.scene, "--no-render", "--out", "long", "--set", "time.steps=600")
+        process = subprocess.Popen([NEPHOS, "export", "long", "--to", "vti", "--zip", "-o", "met"], cwd=self.folder,
+                                   env=self.environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        while process.poll() is None and not (self.folder / "met/tiny_0003.vti").exists():
+            time.sleep(0.001)
+        process.send_signal(signal.SIGSTOP)
+        last = self.folder / "met" / max((self.folder / "long/density").glob("*.vdb")).with_suffix(".vti").name
+        self.assertFalse(last.exists())
+        last.write_text("mine")
+        process.send_signal(signal.SIGCONT)
+        error = process.communicate(timeout=120)[1]
+        self.assertEqual((process.returncode, last.read_text()), (2, "mine"), error)
+        self.assertIn(f"{last.name}: is there already", error)
+        last.unlink()
+        self.call("export", "long", "--to", "vti", "--zip", "-o", "met")
+        self.call("verify", "met")
 
     def test_sequences_are_numbered_from_0(self):
         """As most programs number them."""

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/export/export_work.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <span>
+#include <system_error>
+
+#include <fcntl.h>
+#include <nlohmann/json.hpp>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/error.h"
+#include "core/paths.h"
+#include "simulation/checked_json.h"
+#include "simulation/export/export_list.h"
+
+namespace nephos {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kNotes = "notes.jsonl";
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what, int error) {
+    throw Error(ErrorCode::io, path.string() + ": " + what + ": " + std::strerror(error));
+}
+
+// Renames a file where nothing stands. Returns 0 or errno.
+int rename_to_free_place(int from_folder, const char* name, int to_folder) {
+    if (::renameat2(from_folder, name, to_folder, name, RENAME_NOREPLACE) == 0) return 0;
+    if (errno != EINVAL && errno != ENOSYS) return errno;
+    // A file system that cannot, as some network ones.
+    struct stat status {};
+    if (::fstatat(to_folder, name, &status, AT_SYMLINK_NOFOLLOW) == 0) return EEXIST;
+    if (errno != ENOENT) return errno;
+    return ::renameat(from_folder, name, to_folder, name) == 0 ? 0 : errno;
+}
+
+}  // namespace
+
+Json export_entry(const ExportedFile& file) {
+    Json entry = {
+        {"path", file.path.generic_string()}, {"bytes", file.digest.bytes}, {"xxh3", file.digest.xxh3}};
+    if (!file.source.empty()) entry.update(Json{{"format", file.format}, {"source", file.source}});
+    if (file.source_digest)
+        entry.update(
+            Json{{"source_bytes", file.source_digest->bytes}, {"source_xxh3", file.source_digest->xxh3}});
+    return entry;
+}
+
+std::vector<ExportedFile> noted_files(const std::filesystem::path& folder) {
+    const std::filesystem::path work = folder / kExportWork, path = work / kNotes;
+    std::vector<ExportedFile> files;
+    if (type_at(work) != std::filesystem::file_type::directory ||
+        type_at(path) != std::filesystem::file_type::regular)
+        return files;
+    std::ifstream notes = open_stream(path);
+    for (std::string line; std::getline(notes, line);) {
+        if (line.empty()) continue;
+        const Json entry = parsed_json_text(line);
+        try {
+            files.push_back(exported_file(CheckedJson(entry, path)));
+        } catch (const Error&) {
+            continue;  // a power cut has torn it; its file is then taken for another's
+        }
+    }
+    if (notes.bad()) throw ReadFailure(path, std::strerror(errno));
+    return files;
+}
+
+ExportWork::ExportWork(std::filesystem::path folder) : folder_(std::move(folder)) {
+    const std::filesystem::path work = folder_ / kExportWork;
+    struct stat status {};
+    if (::lstat(work.c_str(), &status) != 0) {
+        if (errno != ENOENT) fail(work, "cannot be examined", errno);
+    } else if (!S_ISDIR(status.st_mode) || status.st_uid != ::geteuid()) {
+        throw Error(ErrorCode::usage,
+                    work.string() +
+                        ": is in the way, and no export of this user has made it: move it away, or "
+                        "choose another folder");
+    }
+}
+
+void ExportWork::begin() {
+    const std::filesystem::path work = folder_ / kExportWork;
+    std::error_code error;
+    std::filesystem::remove_all(work, error);
+    if (error) throw Error(ErrorCode::io, work.string() + ": cannot remove: " + error.message());
+    if (::mkdir(work.c_str(), 0700) != 0) fail(work, "cannot create", errno);
+    try {
+        open();
+    } catch (const Error&) {
+        std::filesystem::remove_all(work, error);
+        work_.reset(-1);
+        throw;
+    }
+}
+
+void ExportWork::open() {
+    const std::filesystem::path work = folder_ / kExportWork;
+    place_.reset(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (place_.get() < 0) fail(folder_, "cannot open", errno);
+    work_.reset(::openat(place_.get(), kExportWork, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+    if (work_.get() < 0) fail(work, "cannot open", errno);
+    notes_.reset(
+        ::openat(work_.get(), kNotes, O_WRONLY | O_APPEND | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
+    if (notes_.get() < 0) fail(work / kNotes, "cannot create", errno);
+    if (const int failed = flush_to_device(work_.get()); failed != 0 && failed != EINVAL)
+        fail(work, "cannot flush to the device", failed);
+    flush();
+}
+
+void ExportWork::publish(const ExportedFile& file) {
+    const std::string name = file.path.string();
+    // Behind one that a full disk has torn it is a line of its own, too.
+    const std::string note =
+        "\n" + export_entry(file).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    {
+        const std::scoped_lock lock(mutex_);
+        const std::filesystem::path notes = folder_ / kExportWork / kNotes;
+        if (const int error = write_all(notes_.get(), std::as_bytes(std::span(note))))
+            fail(notes, "cannot write", error);
+        if (const int error = flush_to_device(notes_.get()); error != 0 && error != EINVAL)
+            fail(notes, "cannot flush to the device", error);
+    }
+    const int error = rename_to_free_place(work_.get(), name.c_str(), place_.get());
+    if (error == 0) return;
+    ::unlinkat(work_.get(), name.c_str(), 0);
+    if (error == EEXIST) throw_place_taken(folder_ / name);
+    fail(folder_ / name, "cannot rename into place", error);
+}
+
+void ExportWork::flush() const {
+    if (place_.get() < 0) return;
+    const int error = flush_to_device(place_.get());
+    if (error != 0 && error != EINVAL) fail(folder_, "cannot flush to the device", error);
+}
+
+void ExportWork::end() {
+    notes_.reset(-1);
+    if (work_.get() < 0) return;
+    const std::filesystem::path work = folder_ / kExportWork;
+    ::unlinkat(work_.get(), kNotes, 0);
+    if (::unlinkat(place_.get(), kExportWork, AT_REMOVEDIR) != 0 && errno != ENOENT) {
+        // A failure has left files in it. By its path only where that is still the folder that was made.
+        std::error_code error;
+        if (is_same_file(work_.get(), work)) std::filesystem::remove_all(work, error);
+        if (error) throw Error(ErrorCode::io, work.string() + ": cannot remove: " + error.message());
+    }
+    work_.reset(-1);
+    place_.reset(-1);
+}
+
+void throw_place_taken(const std::filesystem::path& path) {
+    throw Error(ErrorCode::usage, path.string() +
+                                      ": is there already, and no export of this has listed it: move it "
+                                      "away, or choose another folder");
+}
+
+}  // namespace nephos
