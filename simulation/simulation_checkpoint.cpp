@@ -195,9 +195,18 @@ SavedPoint saved_point(const Checkpoint& checkpoint) {
 
 void Simulation::restore(const Checkpoint& checkpoint, Restart restart) {
     restore_layers(checkpoint);
-    if (steps_taken() != checkpoint.steps || combined_hash(layers_) != checkpoint.state)
-        throw Error(ErrorCode::io, "the checkpoint's state does not have the hash that it names");
     restore_history(checkpoint, restart);
+    Past& present = history_.back();
+    std::vector<StateHash> hashes;
+    for (std::size_t n = 0; n < layers_.size(); ++n) {
+        // The hash of a veil is made of its options, which a branch may change.
+        const bool is_as_saved = restart == Restart::same || !layers_[n].is_veil();
+        hashes.push_back(is_as_saved ? layers_[n].hash() : present.layers[n].hash);
+        present.layers[n].hash = layers_[n].hash();
+    }
+    if (steps_taken() != checkpoint.steps || combined_hash(hashes) != checkpoint.state)
+        throw Error(ErrorCode::io, "the checkpoint's state does not have the hash that it names");
+    present.hash = combined_hash(layers_);
 }
 
 // The layers' states one after the other, each with its length before it.
@@ -298,7 +307,7 @@ void Simulation::restore_history(const Checkpoint& checkpoint, Restart restart) 
     bool good = reader.rest().empty() && !history_.empty() && next_step_ <= before.last_step + 1 &&
                 next_frame_ >= range_.first_frame &&
                 next_frame_ <= std::max(before.last_frame, before.first_frame - 1) + 1 &&
-                history_.back().step == steps_taken() && history_.back().hash == combined_hash(layers_);
+                history_.back().step == steps_taken() && history_.back().hash == checkpoint.state;
     for (std::size_t n = 1; good && n < history_.size(); ++n)
         good = history_[n].step == history_[n - 1].step + 1;
     if (good && !reaches_back && !finished() && (before != range_ || restart == Restart::branch)) {

@@ -56,6 +56,12 @@ std::size_t bytes_of(const Checkpoint& checkpoint) {
     return checkpoint.automaton.size() + checkpoint.history.size();
 }
 
+// Returns the simulation that goes on from a state of this scene, or of what it was before a change while it ran.
+std::shared_ptr<Simulation> goes_on(const Scene& scene, const Checkpoint& from) {
+    return std::make_shared<Simulation>(scene, full_range(scene), kLive, from, SimulationResults::everything,
+                                        Restart::branch);
+}
+
 }  // namespace
 
 FrameOptions film_of_steps(const Scene& scene) {
@@ -325,7 +331,7 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     if (keeps_state) {
         // States before this moment stay valid, those after it do not.
         const Checkpoint now = simulation_->save();
-        simulation = std::make_shared<Simulation>(scene, full_range(scene), kLive, now);
+        simulation = goes_on(scene, now);
     } else {
         check_memory(scene, RunParts::statistics);
         SimulationStart start = simulation_start(scene);
@@ -396,7 +402,7 @@ void LiveScene::thin_checkpoints() {
 void LiveScene::go_back(std::uint64_t step) {
     auto nearest = checkpoints_.upper_bound(step);
     nearest = std::prev(nearest);  // the first is that of step 0
-    simulation_ = std::make_shared<Simulation>(scene_, full_range(scene_), kLive, nearest->second);
+    simulation_ = goes_on(scene_, nearest->second);
 }
 
 // Simulates up to the frame of step `goal`, or of an earlier one after a while, so that a picture is seen meanwhile.

@@ -159,6 +159,19 @@ class Fields(Kept):
         replay = subprocess.run([NEPHOS, "hash", scene, "--steps", str(len(seen) - 1)], capture_output=True, text=True, check=True)
         self.assertEqual(replay.stdout.splitlines(), seen)
 
+    def test_a_wind_recorded_under_a_veil_goes_on(self):
+        """Though the hash of a veil is made of its wind."""
+        scene = self.folder / "v.toml"
+        scene.write_text('seed = 4\n[lattice]\ncells = [16, 16, 12]\n[time]\nstep_s = 7\nsteps = 60\n'
+                         '[[wind]]\nlevels = [{ height_m = 100, east_m_per_s = 4, north_m_per_s = 1 }, { height_m = 9500, east_m_per_s = 27, north_m_per_s = 9 }]\n'
+                         '[[layer]]\nname = "Ci"\nlattice = { cells = [24, 24, 8], cell_size_m = 140, origin_m = [0, 0, 1000] }\n'
+                         '[layer.veil]\nform = "cirrus"\noctaves = 3\n', encoding="utf-8")
+        self.edit(scene, script='wait-step 10\nkey SPACE\nwait 0.5\nclick "tab View"\nclick "Record as key frames"\nclick "tab Properties"\n'
+                                'click find\ntype east_m\nwait 0.4\ndouble-click-at wind[0].levels[0].east_m_per_s 0.5 0.5\n'
+                                'key CTRL+A\ntype 11\nwait 0.2\nkey ENTER\nwait 0.5\nwait-picture\n'
+                                'key HOME\nwait 0.5\nwait-picture\nkey SPACE\nwait-step 25\nkey CTRL+S\nwait 0.5\n')
+        self.assertEqual([frame["levels"][0]["east_m_per_s"] for frame in tomllib.loads(scene.read_text(encoding="utf-8"))["wind"]], [4, 4, 11])
+
     def test_winds_recorded_between_steps_of_fractions_are_replayed(self):
         """The wind before is kept up to the time of the step before, to the last bit: 3.5 s, and not 4.2 s less 0.7 s."""
         scene = self.folder / "w.toml"
