@@ -21,11 +21,13 @@
 namespace nephos {
 namespace {
 
-// Returns true when the manifest beside a checkpoint, by the path that it was named by, is that of its run.
+// Returns true when the manifest beside a checkpoint, by the path that it was named by, is that of its run. Throws ReadFailure.
 bool is_of_run_beside(const std::filesystem::path& checkpoint) {
     try {
         return read_manifest(RunFolder{checkpoint.parent_path(), {}}.manifest()).simulation_hash ==
                read_checkpoint(checkpoint).simulation_hash;
+    } catch (const ReadFailure&) {  // it may be that one
+        throw;
     } catch (const Error&) {
         return false;
     }

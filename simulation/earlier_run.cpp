@@ -358,6 +358,20 @@ void require_tables_of_run(const RunFolder& folder, const EarlierRun& run, std::
             require_table_of_run(path, table.digest, cure);
 }
 
+void require_nothing_appended(const RunFolder& folder, const EarlierRun& run) {
+    for (const FileRecord& table : run.tables) {
+        const std::filesystem::path path = folder.folder / table.path;
+        std::error_code error;
+        const std::uintmax_t size = std::filesystem::file_size(path, error);
+        if (!error && size > table.digest.bytes)
+            throw Error(
+                ErrorCode::io,
+                fmt::format("{}: {} bytes were appended to what the complete run has written, and would be "
+                            "lost: move them to another file{}",
+                            path.string(), size - table.digest.bytes, kStartAnew));
+    }
+}
+
 Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder,
                               const std::vector<RunInput>& inputs) {
     const EarlierRun earlier = read_manifest(folder.manifest());

@@ -59,6 +59,9 @@ Resumption find_resumption(const RunSettings& settings, const RunFolder& folder)
 // written, as require_table_of_run(). One that is not there is its reader's to miss.
 void require_tables_of_run(const RunFolder& folder, const EarlierRun& run, std::string_view cure = {});
 
+// Throws Error(io) naming a table of a complete run that has more than the manifest lists: rows of that run are none of it.
+void require_nothing_appended(const RunFolder& folder, const EarlierRun& run);
+
 // Returns the simulation of the folder's checkpoint. The scene may be that of the first call with a larger
 // `time.steps`; frames that were written before then name the hash of that scene. `inputs`: the files that
 // the scene names, as they are now. Throws Error(usage) when it is another scene, a picture that decides

@@ -88,6 +88,7 @@ void RunRecorder::take_over(const Simulation& simulation) {
     const PublishCheck check(guard_);
     const EarlierRun earlier = read_manifest(folder_.manifest());
     require_tables_of_run(folder_, earlier, kStartAnew);
+    if (earlier.complete) require_nothing_appended(folder_, earlier);
     // Frames before the first row of their step cannot be: a range of frames reports every step from 0.
     statistics_ = StatisticsFile::resume(folder_.statistics(), simulation.next_step(), record_frames_of);
     frames_done_ = int(state_.frames.size());

@@ -12,6 +12,7 @@
 #include "apps/editor/report.h"
 #include "apps/editor/script.h"
 #include "apps/editor/state.h"
+#include "apps/nephos/arguments.h"
 #include "apps/nephos/commands.h"
 #include "core/error.h"
 #include "render/image/image_file.h"
@@ -196,12 +197,20 @@ void shortcuts(Editor& editor) {
     }
 }
 
+// Throws Error(usage) where a picture would replace the scene, or a file that it names.
+void refuse_own_files(const Editor& editor, const std::filesystem::path& picture) {
+    if (editor.document->has_file()) refuse_to_replace(editor.document->path(), picture);
+    if (const Scene* const scene = editor.document->current_scene())
+        refuse_to_replace_files_of(*scene, picture);
+}
+
 void save_capture(Editor& editor) {
     if (editor.capture_to.empty()) return;
     const WindowImage& image = editor.window->captured();
     const std::filesystem::path path = std::exchange(editor.capture_to, {});
     const bool by_user = std::exchange(editor.capture_by_user, false);
     try {
+        refuse_own_files(editor, path);
         save_rgba(path, image.width, image.height, image.rgba);
     } catch (const Error& error) {
         if (!by_user) throw;

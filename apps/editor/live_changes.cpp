@@ -396,13 +396,14 @@ void record_climate(Editor& editor, double final_state, double duration_s) {
         std::ranges::any_of(scene.layers, [](const LayerOptions& layer) { return layer.schedule.empty(); });
     if (!has_follower)
         return say(editor, "The climate stays: each layer has states of its own, layer.climate", true);
-    const double step_s = scene.automaton.time_step_s, now = double(held.step) * step_s;
+    const double step_s = scene.automaton.time_step_s, now = double(held.step) * step_s,
+                 last = (double(held.step) - 1) * step_s;  // as the simulation has it
     const auto state = [&](double time_s) {
         return scene.climate.schedule.empty() ? 0.0 : state_at(scene.climate.schedule, time_s);
     };
     std::vector<StatePoint> points;
     for (const StatePoint& point : scene.climate.schedule) {
-        if (point.time_s < now - step_s) points.push_back(point);
+        if (point.time_s < last) points.push_back(point);
     }
     // Every step between two points gets one, so that the past keeps its bits.
     const double from = points.empty() ? -step_s : points.back().time_s;

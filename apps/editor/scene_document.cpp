@@ -187,8 +187,8 @@ void SceneDocument::save_as(const fs::path& path) {
     const bool moved = !has_file_ || path != path_;
     remove_autosave();
     path_ = path;
-    real_folder_ = without_links(folder());
     has_file_ = true;
+    real_folder_ = without_links(folder());
     is_gone_ = false;
     saved_text_ = text();
     file_stamp_.reset();

@@ -102,7 +102,14 @@ void add_edit_command(CLI::App& app, Action& action, const EditFunction& edit) {
         "  nephos edit\n"
         "  nephos edit scenes/climate.toml\n"
         "  xvfb-run -a nephos edit scenes/cumulus.toml --screenshot editor.png --after 5");
-    command->callback([a, &action, edit] { action = [a, edit] { return edit(*a); }; });
+    command->callback([a, &action, edit] {
+        action = [a, edit] {
+            // Before a window opens; the files that the scene names are looked at when the picture is saved.
+            for (const std::string* const read : {&a->scene, &a->script})
+                if (!a->screenshot.empty() && !read->empty()) refuse_to_replace(*read, a->screenshot);
+            return edit(*a);
+        };
+    });
 }
 
 }  // namespace nephos

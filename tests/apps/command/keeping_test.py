@@ -167,6 +167,10 @@ class Keeping(Case):
             manifest.write_text(unsealed({**json.loads(complete), "complete": False}))
             self.assertIn("does not begin with the", self.call("verify", folder, status=1).stdout)
             manifest.write_bytes(complete)
+            # What stands behind the rows of a complete run is none of it, and is not cut off.
+            table.write_bytes(whole + b"# my note\n")
+            for further in ((), more):
+                self.kept(folder, 3, *command, *further, "--out", folder, "--resume", says=f"{folder}/{name}: 10 bytes were appended")
             table.write_bytes(whole)
             self.call(*command, *more, "--out", folder, "--resume")
             self.call("verify", folder)

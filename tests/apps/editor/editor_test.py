@@ -81,6 +81,17 @@ class Window(Case):
             self.assertLess(ImageStat.Stat(grey).mean[0], 90)
             self.assertGreater(grey.getextrema()[1], 120)  # letters
 
+    def test_a_screenshot_replaces_no_file_of_the_scene(self):
+        scene, script, picture = self.scene("cumulus.toml"), self.folder / "clicks.txt", self.folder / "mask.png"
+        script.write_text("wait 0.1\n", encoding="utf-8")
+        Image.new("L", (4, 4), 255).save(picture)
+        scene.write_text(scene.read_text(encoding="utf-8").replace("[ground]\n", '[ground]\nheight_map = "mask.png"\n'), encoding="utf-8")
+        for path in (scene, script, picture):
+            before = path.read_bytes()
+            arguments = ["--script", script] if path == script else []
+            self.assertIn("is the file that is read", self.edit(scene, "--screenshot", path, "--after", "0.2", *arguments, status=2))
+            self.assertEqual(path.read_bytes(), before)
+
     def test_light_theme_and_large_text(self):
         picture = self.folder / "window.png"
         self.edit("--screenshot", picture, "--after", "3", "--theme", "light", "--scale", "1.5", "--validation")

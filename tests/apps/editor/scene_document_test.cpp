@@ -323,6 +323,15 @@ TEST(SceneDocument, TwoEditorsKeepTheirOwnEdits) {
     EXPECT_TRUE(SceneDocument(std::string("seed = 5\n")).left_autosaves(folder.path).empty());
 }
 
+// One in the way of each name of a scene's edits, as root may write everywhere.
+void put_folders_in_the_way(const std::filesystem::path& scenes, const std::string& name) {
+    for (int n = 0; n < 1000; ++n) {
+        const std::string middle =
+            n == 0 ? "" : "." + std::to_string(::getpid()) + (n > 1 ? "-" + std::to_string(n) : "");
+        std::filesystem::create_directory(scenes / ("." + name + middle + ".autosave"));
+    }
+}
+
 // Beside an installed scene one cannot write: its edits, and those of its copies, are kept in the folder of settings, under
 // names that tell them from those of scenes called alike.
 TEST(SceneDocument, EditsOfASceneWhoseFolderCannotBeWrittenAreKeptElsewhere) {
@@ -332,13 +341,7 @@ TEST(SceneDocument, EditsOfASceneWhoseFolderCannotBeWrittenAreKeptElsewhere) {
     for (const std::filesystem::path& scenes : {one, two}) {
         std::filesystem::create_directory(scenes);
         write(scenes / "a.toml", "seed = 1\n");
-        // A folder in the way of each name, as root may write everywhere.
-        for (const std::string name : {"a.toml", "a-2.toml"})
-            for (int n = 0; n < 1000; ++n) {
-                const std::string middle =
-                    n == 0 ? "" : "." + std::to_string(::getpid()) + (n > 1 ? "-" + std::to_string(n) : "");
-                std::filesystem::create_directory(scenes / ("." + name + middle + ".autosave"));
-            }
+        for (const std::string name : {"a.toml", "a-2.toml"}) put_folders_in_the_way(scenes, name);
     }
     {
         SceneDocument document(one / "a.toml"), copy("seed = 1\n", "a-2.toml", one);
@@ -358,6 +361,32 @@ TEST(SceneDocument, EditsOfASceneWhoseFolderCannotBeWrittenAreKeptElsewhere) {
     next.save();
     EXPECT_EQ(next.left_autosaves(settings).size(), 1u);
     EXPECT_TRUE(SceneDocument(two / "a.toml").left_autosaves(settings).empty());
+}
+
+// Of a scene that had no file before, or one in another folder, as a copy: they are of the file that it was saved as.
+TEST(SceneDocument, EditsKeptElsewhereAreOfTheFileThatWasSaved) {
+    const Folder folder;
+    const std::filesystem::path settings = folder.path / "settings", one = folder.path / "one",
+                                two = folder.path / "two";
+    for (const std::filesystem::path& scenes : {one, two}) std::filesystem::create_directory(scenes);
+    for (const std::string name : {"a.toml", "b.toml"}) put_folders_in_the_way(two, name);
+    {
+        SceneDocument made(std::string("seed = 1\n")), copy("seed = 2\n", "b.toml", one);
+        made.save_as(two / "a.toml");
+        copy.save_as(two / "b.toml");
+        made.edit("seed = 7\n", "edit");
+        copy.edit("seed = 8\n", "edit");
+        made.autosave(settings);
+        copy.autosave(settings);
+    }
+    for (const auto& [name, text] : {std::pair("a.toml", "seed = 7\n"), std::pair("b.toml", "seed = 8\n")}) {
+        SceneDocument next(two / name);
+        const auto left = next.left_autosaves(settings);
+        ASSERT_EQ(left.size(), 1u) << name;
+        EXPECT_EQ(left[0].text, text);
+        write(one / name, "seed = 3\n");
+        EXPECT_TRUE(SceneDocument(one / name).left_autosaves(settings).empty()) << name;
+    }
 }
 
 // Names of the folder of settings tell all folders of scenes from each other.
