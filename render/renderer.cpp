@@ -60,7 +60,7 @@ decltype(auto) with_drawing_errors(Work&& work) {
     try {
         return with_gpu_errors("drawing", std::forward<Work>(work));
     } catch (const std::bad_alloc&) {
-        throw Error(ErrorCode::usage, "not enough memory for a picture of this size");
+        throw Error(ErrorCode::io, "not enough memory for a picture of this size");
     }
 }
 

@@ -296,7 +296,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     const Resumption resumption = found();  // once more: another run may have been at work until now
     if (resumption == Resumption::complete) return report_of_complete(settings, folder);
     settings.resume = resumption == Resumption::go_on;
-    std::vector<RunInput> inputs = inputs_of(settings);
+    std::vector<RunInput> inputs = settings.inputs ? *settings.inputs : inputs_of(settings);
     const auto claim = std::make_shared<Claim>(claim_folder(folder, settings, inputs, resumption, *lock));
     const auto require_in_place = [lock, claim, folder, &settings] {
         lock->require_in_place();

@@ -18,6 +18,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -60,6 +61,8 @@ struct BranchPoint {
     int next_frame = 1;  // the first that the branch writes
 };
 
+struct RunInput;
+
 struct RunSettings {
     Scene scene;
     std::optional<Lattice> initial;  // the state at step 0, when it is not the scene's own; taken by the run
@@ -68,6 +71,9 @@ struct RunSettings {
     std::string scene_hash;          // of everything in the scene
     std::string simulation_hash;     // of what decides the automaton's bits
     FileStamps stamps;               // of the files that the scene names, before the first of them was read
+    // The files as they were when `stamps` were taken (simulation/run_inputs.h), where they may have changed since; null: they are
+    // read when the run begins.
+    std::shared_ptr<const std::vector<RunInput>> inputs{};
     SimulationRange range;
     bool statistics_only = false;  // no frames: statistics of every step (SimulationResults::statistics)
     bool render = true;            // pictures too

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <memory>
 #include <vector>
 
 #include "statistics/series.h"
@@ -15,6 +16,7 @@
 #include "core/error.h"
 #include "scenes/format/writer.h"
 #include "simulation/checked_json.h"
+#include "simulation/run_inputs.h"
 
 namespace nephos {
 namespace {
@@ -122,6 +124,8 @@ UntilReport run_until(RunSettings settings, const StopAt& stop, std::uint64_t ma
     // Parts that an earlier call has finished were followed by longer ones.
     if (settings.resume) steps = std::clamp(steps_before(settings), steps, std::max(steps, max_steps));
     UntilReport report;
+    // Of what was read at the beginning, whatever becomes of the files: all parts are of that.
+    settings.inputs = std::make_shared<const std::vector<RunInput>>(inputs_of(settings));
     while (true) {
         RunSettings part = settings;
         part.scene.steps = steps;
@@ -139,7 +143,7 @@ UntilReport run_until(RunSettings settings, const StopAt& stop, std::uint64_t ma
             return report;
         }
         steps = std::min(max_steps, steps + std::max<std::uint64_t>(steps / 2, 1));
-        settings.stamps.clear();  // the next part has what was read of the files
+        settings.stamps.clear();
         settings.resume = true;
         settings.overwrite = false;
     }

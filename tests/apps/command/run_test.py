@@ -102,6 +102,25 @@ class Run(Case):
         self.assertEqual(process.returncode, 128 + signal.SIGTERM, said)
         self.assertIn("with --resume goes on", said)
 
+    def test_until_lists_the_files_that_it_has_read(self):
+        """Though one is exchanged between two of its parts: all of them are of the first."""
+        self.call("state", self.scene, "--steps", "1", "--out", "first.vdb")
+        self.call("state", self.scene, "--steps", "3", "--out", "other.vdb")
+        shutil.copy(self.folder / "first.vdb", self.folder / "s.vdb")
+        until = ("run", self.scene, "--statistics-only", "--until", "cover.se=1e-9", "--max-steps", "40", "--set", "time.steps=8", "--set", "field.background.ext=0.4",
+                 "--set", "lattice.initial_state=s.vdb")
+        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename STOP 4 1", "FAIL_PATH": "until/manifest"}
+        self.call(*until, "--out", "whole", status=1)
+        process = subprocess.Popen([NEPHOS, *until, "--out", "until"], cwd=self.folder, env=environment, stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.PIPE, text=True)
+        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)  # in a later part
+        shutil.copy(self.folder / "other.vdb", self.folder / "s.vdb")
+        process.send_signal(signal.SIGCONT)
+        said = process.communicate(timeout=60)[1]
+        self.assertEqual(process.returncode, 1, said)
+        inputs = [json.loads((self.folder / name / "manifest.json").read_text())["inputs"] for name in ("whole", "until")]
+        self.assertEqual(inputs[0], inputs[1])
+
     def test_a_scene_whose_canonical_text_is_long(self):
         """Every key spelled out, the scene of this run has more bytes than a scene may have."""
         small = "{centre_m=[%d,300,300],semi_axes_m=[60,60,60]}"
