@@ -277,6 +277,10 @@ SimulationResults RunSettings::results() const {
     return statistics_only ? SimulationResults::statistics : SimulationResults::everything;
 }
 
+void keep_inputs(RunSettings& settings) {
+    settings.inputs = std::make_shared<const std::vector<RunInput>>(inputs_of(settings));
+}
+
 RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     const Clock::time_point begin = Clock::now();
     if (settings.statistics_only) settings.range = {settings.scene.steps, 1, 0};

@@ -71,8 +71,8 @@ struct RunSettings {
     std::string scene_hash;          // of everything in the scene
     std::string simulation_hash;     // of what decides the automaton's bits
     FileStamps stamps;               // of the files that the scene names, before the first of them was read
-    // The files as they were when `stamps` were taken (simulation/run_inputs.h), where they may have changed since; null: they are
-    // read when the run begins.
+    // The files with their checksums of then, where they may have changed since (keep_inputs()); null: they are read when the run
+    // begins.
     std::shared_ptr<const std::vector<RunInput>> inputs{};
     SimulationRange range;
     bool statistics_only = false;  // no frames: statistics of every step (SimulationResults::statistics)
@@ -90,6 +90,10 @@ struct RunSettings {
 
     SimulationResults results() const;
 };
+
+// Reads the checksums of the files that the scene names into settings.inputs: for a run in several parts, all of which have what was
+// read before the first. Throws Error(io) with the place of the key.
+void keep_inputs(RunSettings& settings);
 
 // Selects where a run starts.
 enum class RunStart {

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
-#include <memory>
 #include <vector>
 
 #include "statistics/series.h"
@@ -16,7 +15,6 @@
 #include "core/error.h"
 #include "scenes/format/writer.h"
 #include "simulation/checked_json.h"
-#include "simulation/run_inputs.h"
 
 namespace nephos {
 namespace {
@@ -125,7 +123,7 @@ UntilReport run_until(RunSettings settings, const StopAt& stop, std::uint64_t ma
     if (settings.resume) steps = std::clamp(steps_before(settings), steps, std::max(steps, max_steps));
     UntilReport report;
     // Of what was read at the beginning, whatever becomes of the files: all parts are of that.
-    settings.inputs = std::make_shared<const std::vector<RunInput>>(inputs_of(settings));
+    keep_inputs(settings);
     while (true) {
         RunSettings part = settings;
         part.scene.steps = steps;

@@ -126,8 +126,13 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
         }
         if (held != mark.path || !ImGui::IsMouseDragging(ImGuiMouseButton_Left, 3)) continue;
         const double under = double((mouse.x - from - rim) / std::max(width - 2 * rim, 1.0f)) * span;
-        const double time_s = std::round(std::clamp(under, 0.0, span)) * step_s;
-        if (time_s < mark.least_s || time_s > mark.most_s || time_s == mark.time_s) continue;
+        // Up to the last step before the neighbour, however far it is dragged.
+        double least = std::ceil(mark.least_s / step_s), most = std::floor(mark.most_s / step_s);
+        if (least * step_s < mark.least_s) ++least;  // quotients are rounded
+        if (most * step_s > mark.most_s) --most;
+        if (least > most) continue;
+        const double time_s = std::clamp(std::round(std::clamp(under, 0.0, span)), least, most) * step_s;
+        if (time_s == mark.time_s) continue;
         set_values(editor, mark.path, {{"time_s", number_text(time_s)}}, true);
         break;  // the scene is another now
     }

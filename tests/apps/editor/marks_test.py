@@ -47,6 +47,13 @@ class Marks(Kept):
         self.assertEqual(times[0], 0)
         self.assertTrue(0 < times[1] < 900, times)
 
+    def test_a_mark_that_is_dragged_far_stops_before_the_next(self):
+        winds = "".join(f"[[wind]]\ntime_s = {time}\nlevels = [{{ height_m = 1000, from_deg = 250, speed_m_per_s = 7.5 }}]\n" for time in (0, 100, 205))
+        text = f"seed = 4\n[lattice]\ncells = [16, 16, 12]\n[time]\nstep_s = 10\nsteps = 60\n{winds}"
+        for way, time in ((600, 200), (-600, 10)):
+            saved = self.saved(text, f'drag "key frame wind[1]" {way} 0\nwait 0.3\n')
+            self.assertEqual([frame["time_s"] for frame in tomllib.loads(saved)["wind"]], [0, time, 205])
+
     def test_states_without_key_frames_have_no_marks(self):
         """They come from keys, which no drag can change."""
         scene = self.folder / "s.toml"
