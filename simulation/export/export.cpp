@@ -238,7 +238,8 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
     for (const ListedFrame& frame : run.frames) {
         if (is_wanted(options, frame.number, 1)) frames.push_back(summarise(run, frame));
     }
-    std::ranges::move(limit_notes(options.weather, frames), std::back_inserter(notes));
+    const std::vector<WeatherFormat> formats = all_weather(options);
+    std::ranges::move(limit_notes(formats, frames), std::back_inserter(notes));
     const auto write_file = [&](std::string_view extension, std::span<const std::byte> content) {
         const std::string name = run.scene.name + std::string(extension);
         write_text_file(list, name, content, notes);
@@ -250,7 +251,7 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
     const auto write_text = [&](WeatherFormat format, const std::string& text) {
         write(format, std::as_bytes(std::span(text.data(), text.size())));
     };
-    for (const WeatherFormat format : options.weather) {
+    for (const WeatherFormat format : formats) {
         switch (format) {
             case WeatherFormat::layers:
                 write_text(format, layers_json_text(run, frames));

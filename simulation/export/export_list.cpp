@@ -155,6 +155,7 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     std::vector<ExportedFile> files;
     for (const CheckedJson& file : CheckedJson(json, path).at("files").items())
         files.push_back(exported_file(file));
+    was_interrupted_ = !CheckedJson(json, path).at("complete").truth();
     json.erase("files");
     json.erase("complete");
     json.erase(kSealKey);
@@ -176,7 +177,8 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
 
 void ExportList::require_free(const std::vector<std::string>& names) const {
     for (const std::string& name : names)
-        if (!earlier_.contains(name) && stands_there(folder_ / name)) throw_place_taken(folder_ / name);
+        if (!earlier_.contains(name) && stands_there(folder_ / name))
+            throw_place_taken(folder_ / name, was_interrupted_);
 }
 
 void ExportList::begin() {
@@ -207,11 +209,19 @@ std::string ExportList::note_on_change(const std::string& name) const {
 ExportedFile ExportList::write_file(const std::string& name, const ExportSource& source,
                                     std::string_view format,
                                     const std::function<void(const std::filesystem::path& path)>& write) {
-    const bool is_listed = earlier_.contains(name) && stands_there(folder_ / name);
-    const std::filesystem::path path = is_listed ? folder_ / name : work_.path_of(name);
-    write(path);
+    const std::filesystem::path path = work_.path_of(name);
+    work_.require_in_place();
+    const std::function<void()> in_place = [this] { work_.require_in_place(); };
+    {
+        const PublishCheck keeps_in_place(in_place);
+        write(path);
+    }
     ExportedFile file{name, file_digest(path), below_folder(source.path), std::string(format), source.digest};
-    if (!is_listed) work_.publish(file);
+    work_.note(file);
+    if (earlier_.contains(name) && stands_there(folder_ / name))
+        work_.replace(name);
+    else
+        work_.place(name);
     const std::scoped_lock lock(mutex_);
     made_[name] = file;
     return file;
@@ -252,11 +262,27 @@ void ExportList::write(bool complete) const {
                      std::string_view(sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace))));
 }
 
+// Throws Error(io) where one was removed or replaced by another meanwhile.
+void ExportList::require_files() const {
+    for (const ExportedFile& file : files_) {
+        std::error_code error;
+        const std::filesystem::path path = folder_ / file.path;
+        if (type_behind(path) != std::filesystem::file_type::regular ||
+            std::filesystem::file_size(path, error) != file.digest.bytes)
+            throw Error(ErrorCode::io,
+                        path.string() +
+                            ": was removed or changed while the export was writing: give the same "
+                            "command again");
+    }
+}
+
 void ExportList::end(bool complete) {
     work_.flush();
     write(false);
     work_.end();
-    if (complete) write(true);  // the last of all: nothing is in the folder that it does not list
+    if (!complete) return;
+    require_files();
+    write(true);  // the last of all: nothing is in the folder that it does not list
 }
 
 std::vector<std::string> ExportList::remove_left_over() const {

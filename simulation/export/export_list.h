@@ -43,9 +43,8 @@ class ExportList {
     std::optional<ExportedFile> kept_file(const std::string& name, const ExportSource& source) const;
     // Returns what is to be told of a file that is not as it was listed, and is about to be made again; empty: nothing. Thread-safe.
     std::string note_on_change(const std::string& name) const;
-    // Calls `write` with the path that it is to write, and returns the entry of the file, with its checksum. One that is listed is
-    // written in its place; another is noted before it gets its place (ExportWork), in which nothing may stand. Thread-safe for
-    // different files. Throws Error(usage) naming what stands there, Error(io); exceptions of `write` pass through.
+    // Calls `write` with the path that it is to write, and returns the entry of the file, with its checksum. It is noted before it gets
+    // its place (ExportWork), in which nothing may stand but a file that is listed. Thread-safe for different files. Throws Error(usage) naming what stands there, Error(io); exceptions of `write` pass through.
     ExportedFile write_file(const std::string& name, const ExportSource& source, std::string_view format,
                             const std::function<void(const std::filesystem::path& path)>& write);
     // List a file; those of frames in their order.
@@ -65,11 +64,13 @@ class ExportList {
 
   private:
     void write(bool complete) const;
+    void require_files() const;
     std::string below_folder(const std::filesystem::path& source) const;
 
     std::filesystem::path folder_;
     std::string head_;  // JSON of all but the files
     ExportWork work_;
+    bool was_interrupted_ = false;
     std::map<std::string, ExportedFile> earlier_;  // what was there, by its name
     std::map<std::string, ExportedFile>
         made_;          // what this one has written, also of frames whose turn has not come

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/export/export_work.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
+#include <functional>
 #include <span>
+#include <sstream>
 #include <system_error>
 
 #include <fcntl.h>
@@ -13,6 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/paths.h"
 #include "simulation/checked_json.h"
@@ -24,15 +27,25 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kNotes = "notes.jsonl";
+constexpr std::size_t kMostNote = std::size_t(64) << 10;  // bytes; paths have at most 4096
 
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& what, int error) {
     throw Error(ErrorCode::io, path.string() + ": " + what + ": " + std::strerror(error));
 }
 
+// Returns whether a folder has what an export leaves in its own: notes, files and no folders; or nothing.
+bool is_of_export(const std::filesystem::path& work) {
+    const std::vector<std::string> names = names_in_folder(work);
+    const auto is_file = [&](const std::string& name) {
+        return type_at(work / name) == std::filesystem::file_type::regular;
+    };
+    return names.empty() || (std::ranges::count(names, kNotes) > 0 && std::ranges::all_of(names, is_file));
+}
+
 // Renames a file where nothing stands. Returns 0 or errno.
 int rename_to_free_place(int from_folder, const char* name, int to_folder) {
     if (::renameat2(from_folder, name, to_folder, name, RENAME_NOREPLACE) == 0) return 0;
-    if (errno != EINVAL && errno != ENOSYS) return errno;
+    if (errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP) return errno;
     // A file system that cannot, as some network ones.
     struct stat status {};
     if (::fstatat(to_folder, name, &status, AT_SYMLINK_NOFOLLOW) == 0) return EEXIST;
@@ -58,9 +71,9 @@ std::vector<ExportedFile> noted_files(const std::filesystem::path& folder) {
     if (type_at(work) != std::filesystem::file_type::directory ||
         type_at(path) != std::filesystem::file_type::regular)
         return files;
-    std::ifstream notes = open_stream(path);
+    std::istringstream notes(read_json_text(path));
     for (std::string line; std::getline(notes, line);) {
-        if (line.empty()) continue;
+        if (line.empty() || line.size() > kMostNote) continue;
         const Json entry = parsed_json_text(line);
         try {
             files.push_back(exported_file(CheckedJson(entry, path)));
@@ -68,27 +81,33 @@ std::vector<ExportedFile> noted_files(const std::filesystem::path& folder) {
             continue;  // a power cut has torn it; its file is then taken for another's
         }
     }
-    if (notes.bad()) throw ReadFailure(path, std::strerror(errno));
     return files;
 }
 
 ExportWork::ExportWork(std::filesystem::path folder) : folder_(std::move(folder)) {
     const std::filesystem::path work = folder_ / kExportWork;
-    struct stat status {};
+    struct stat status {
+    }, list{};
     if (::lstat(work.c_str(), &status) != 0) {
         if (errno != ENOENT) fail(work, "cannot be examined", errno);
-    } else if (!S_ISDIR(status.st_mode) || status.st_uid != ::geteuid()) {
+        return;
+    }
+    // Whose list is believed may have notes, too: for root, and where a file system has one owner for all.
+    const bool is_of_list =
+        ::lstat((folder_ / "export.json").c_str(), &list) == 0 && list.st_uid == status.st_uid;
+    if (!S_ISDIR(status.st_mode) || (status.st_uid != ::geteuid() && !is_of_list) || !is_of_export(work))
         throw Error(ErrorCode::usage,
                     work.string() +
                         ": is in the way, and no export of this user has made it: move it away, or "
                         "choose another folder");
-    }
 }
 
 void ExportWork::begin() {
     const std::filesystem::path work = folder_ / kExportWork;
     std::error_code error;
-    std::filesystem::remove_all(work, error);
+    for (const std::string& name : names_in_folder(work))
+        if (!error) std::filesystem::remove(work / name, error);
+    if (!error) std::filesystem::remove(work, error);
     if (error) throw Error(ErrorCode::io, work.string() + ": cannot remove: " + error.message());
     if (::mkdir(work.c_str(), 0700) != 0) fail(work, "cannot create", errno);
     try {
@@ -114,24 +133,38 @@ void ExportWork::open() {
     flush();
 }
 
-void ExportWork::publish(const ExportedFile& file) {
-    const std::string name = file.path.string();
+void ExportWork::note(const ExportedFile& file) {
     // Behind one that a full disk has torn it is a line of its own, too.
     const std::string note =
         "\n" + export_entry(file).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
-    {
-        const std::scoped_lock lock(mutex_);
-        const std::filesystem::path notes = folder_ / kExportWork / kNotes;
-        if (const int error = write_all(notes_.get(), std::as_bytes(std::span(note))))
-            fail(notes, "cannot write", error);
-        if (const int error = flush_to_device(notes_.get()); error != 0 && error != EINVAL)
-            fail(notes, "cannot flush to the device", error);
-    }
+    const std::scoped_lock lock(mutex_);
+    const std::filesystem::path notes = path_of(kNotes);
+    if (const int error = write_all(notes_.get(), std::as_bytes(std::span(note))))
+        fail(notes, "cannot write", error);
+    if (const int error = flush_to_device(notes_.get()); error != 0 && error != EINVAL)
+        fail(notes, "cannot flush to the device", error);
+}
+
+void ExportWork::place(const std::string& name) {
     const int error = rename_to_free_place(work_.get(), name.c_str(), place_.get());
     if (error == 0) return;
     ::unlinkat(work_.get(), name.c_str(), 0);
     if (error == EEXIST) throw_place_taken(folder_ / name);
     fail(folder_ / name, "cannot rename into place", error);
+}
+
+void ExportWork::require_in_place() const {
+    if (is_same_file(place_.get(), folder_) && is_same_file(work_.get(), folder_ / kExportWork)) return;
+    throw Error(
+        ErrorCode::io,
+        folder_.string() + ": the folder was removed or renamed while the export was writing into it");
+}
+
+void ExportWork::replace(const std::string& name) {
+    const std::function<void()> check = [this] { require_in_place(); };
+    const PublishCheck keeps_in_place(check);
+    copy_atomically(path_of(name), folder_ / name);
+    ::unlinkat(work_.get(), name.c_str(), 0);
 }
 
 void ExportWork::flush() const {
@@ -155,10 +188,12 @@ void ExportWork::end() {
     place_.reset(-1);
 }
 
-void throw_place_taken(const std::filesystem::path& path) {
-    throw Error(ErrorCode::usage, path.string() +
-                                      ": is there already, and no export of this has listed it: move it "
-                                      "away, or choose another folder");
+void throw_place_taken(const std::filesystem::path& path, bool may_be_own) {
+    throw Error(ErrorCode::usage,
+                path.string() + ": is there already, and no export of this has listed it: " +
+                    (may_be_own ? "if the one that was interrupted has written it, whose notes are not "
+                                  "there, remove it; otherwise move it away, or choose another folder"
+                                : "move it away, or choose another folder"));
 }
 
 }  // namespace nephos

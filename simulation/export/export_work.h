@@ -29,16 +29,22 @@ std::vector<ExportedFile> noted_files(const std::filesystem::path& folder);
 // For the holder of the folder's lock alone.
 class ExportWork {
   public:
-    // Throws Error(usage) when something is in the place of the hidden folder that no export of this user has made; Error(io).
+    // Throws Error(usage) when something is in the place of the hidden folder that no export has made, of this user or of who has
+    // written the list; Error(io).
     explicit ExportWork(std::filesystem::path folder);
 
-    // Makes the hidden folder, without what a killed export left in it: what that had noted must be listed by now. Throws Error(io).
+    // Makes the hidden folder, without what a killed export left in it, which must be listed by now. Throws Error(io).
     void begin();
+    // Throws Error(io) when the folder or the hidden one is not in its place any more: another might be.
+    void require_in_place() const;
     // Returns where a file is to be written.
     std::filesystem::path path_of(const std::string& name) const { return folder_ / kExportWork / name; }
-    // Notes a file that was written there, flushes the note to the device, and gives the file its place. Thread-safe. Throws Error(io);
-    // Error(usage) naming what stands in that place.
-    void publish(const ExportedFile& file);
+    // Notes a file that was written there, and flushes the note to the device. Thread-safe. Throws Error(io).
+    void note(const ExportedFile& file);
+    // Gives a noted file its place. Thread-safe. Throws Error(io); Error(usage) naming what stands there.
+    void place(const std::string& name);
+    // The same where a file is listed: its content is replaced, its owner and permissions stay, and links lead to it. Throws Error(io).
+    void replace(const std::string& name);
     // Flushes the names of all places to the device, once they are begun. Throws Error(io).
     void flush() const;
     // Removes the hidden folder, once it is begun: all that was noted is listed. Throws Error(io).
@@ -52,7 +58,8 @@ class ExportWork {
     std::mutex mutex_;                 // of notes_
 };
 
-// Throws Error(usage): a file of somebody else stands at a place.
-[[noreturn]] void throw_place_taken(const std::filesystem::path& path);
+// Throws Error(usage): a file that is in no list stands at a place. `may_be_own`: the last export was interrupted, and the notes say
+// nothing of it, as where somebody has removed them.
+[[noreturn]] void throw_place_taken(const std::filesystem::path& path, bool may_be_own = false);
 
 }  // namespace nephos

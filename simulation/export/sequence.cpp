@@ -334,6 +334,13 @@ std::vector<ExportFormat> all_formats(const ExportOptions& options) {
     return formats;
 }
 
+std::vector<WeatherFormat> all_weather(const ExportOptions& options) {
+    std::vector<WeatherFormat> formats = options.weather;
+    std::sort(formats.begin(), formats.end());
+    formats.erase(std::unique(formats.begin(), formats.end()), formats.end());
+    return formats;
+}
+
 void require_unchanged(const SourceFrame& frame) {
     if (file_stamp(frame.file) == frame.stamp) return;
     throw Error(ErrorCode::io, frame.file.string() + ": was changed while it was exported: export it again");

@@ -70,6 +70,8 @@ std::vector<std::array<int, 3>> level_sizes(const ExportSequence& sequence, Expo
 std::uint64_t dense_bytes(const ExportOptions& options, const ExportSequence& sequence, ExportFormat format);
 // USD refers to VDB files, which are written with it. Sorted, each once.
 std::vector<ExportFormat> all_formats(const ExportOptions& options);
+// Returns the summaries of weather, each once.
+std::vector<WeatherFormat> all_weather(const ExportOptions& options);
 
 // Returns whether a frame is to be exported; the source begins with the number `least`.
 bool is_wanted(const ExportOptions& options, int number, int least);

@@ -442,6 +442,7 @@ class Export(Case):
                     self.killed(call, first, path, *arguments)
                     left = folder / name
                     if left.exists():  # it had come to this one
+                        self.assertEqual((path, name), ("README", "placed_0004.raw") if name.endswith("raw") else ("README", "placed.layers.json"))
                         shutil.rmtree(folder)
                         continue
                     left.symlink_to(elsewhere) if is_link else left.write_text("mine")
@@ -452,6 +453,100 @@ class Export(Case):
                     self.call("export", "run", *arguments)
                     self.call("verify", "out")
                     shutil.rmtree(folder)
+
+    def test_a_killed_export_knows_what_it_has_made_again(self):
+        """Files of a list that are made again, of other frames or another source, are noted as well: one that asks for less removes them."""
+        for call, path, changes in (("rename", "placed.volume.json", False), ("fsync", "placed_0003", True)):
+            folder = self.export("out", "--to", "raw", "--to", "layers", "--frames", "1..4" if changes else "1..3")
+            if changes:
+                for number in (1, 2, 3):
+                    shutil.copy(self.folder / "run/density/placed_0004.vdb", self.folder / f"run/density/placed_000{number}.vdb")
+            try:
+                self.killed(call, 1, path, "--to", "raw", "--to", "layers", "-o", "out")
+                said = self.call("export", "run", "--to", "raw", "--frames", "1..2", "-o", "out").stderr
+                self.assertNotIn("changed since", said)
+                self.call("verify", "out")
+                self.assertEqual({file.name for file in folder.iterdir()},
+                                 {"README.txt", "export.json", "placed.volume.json", "placed_0001.raw", "placed_0002.raw"})
+                self.export("out", "--to", "raw", "--to", "layers")
+            finally:
+                shutil.rmtree(folder)
+
+    def test_every_preset_takes_every_summary_of_weather(self):
+        """Also one that it writes by itself, or that is named twice."""
+        for preset in ("blender", "flightgear", "msfs", "xplane", "cigi"):
+            for form in ("layers", "metar", "xplane", "wpr", "cigi"):
+                self.export(f"{preset}-{form}", "--for", preset, "--to", form, "--to", form)
+
+    def test_an_interrupted_export_without_its_notes(self):
+        """It says how it may go on, and removes nothing of others."""
+        self.killed("rename", 2, "out/placed_", "--to", "raw", "-o", "out")
+        shutil.rmtree(self.folder / "out/.nephos-export")
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="if the one that was interrupted has written it, whose notes are not there, remove it")
+        (self.folder / "out/.nephos-export/mine").mkdir(parents=True)
+        for path in (self.folder / "out").glob("*.raw"):
+            path.unlink()
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
+        (self.folder / "out/.nephos-export/mine").rmdir()
+        (self.folder / "out/.nephos-export/mine").write_text("mine")
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
+        (self.folder / "out/.nephos-export/mine").unlink()
+        self.export("out", "--to", "raw")
+
+    def test_notes_of_others(self):
+        """Damaged, very long or none at all, they let nothing in and take no memory."""
+        whole = self.export("whole", "--to", "raw")
+        for number, notes in enumerate((b"\0" * 100, b"[" * 100_000, b'{"path": "../run/manifest.json", "bytes": 1, "xxh3": "0"}\n', b"", None)):
+            self.killed("rename", 2, f"out-{number}/placed_", "--to", "raw", "-o", f"out-{number}")
+            path = self.folder / f"out-{number}/.nephos-export/notes.jsonl"
+            path.write_bytes(notes or b"")
+            if notes is None:
+                os.truncate(path, 100 << 30)
+            done = subprocess.run([NEPHOS, "export", "run", "--to", "raw", "-o", f"out-{number}"], cwd=self.folder, env=self.environment,
+                                  capture_output=True, text=True, check=False, preexec_fn=lambda: limit_addresses(2 << 30))
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn("whose notes are not there", done.stderr)
+            for path in (self.folder / f"out-{number}").glob("*.raw"):
+                path.unlink()
+            self.export(f"out-{number}", "--to", "raw")
+            self.assertEqual({file.name: file.read_bytes() for file in (self.folder / f"out-{number}").iterdir()},
+                             {file.name: file.read_bytes() for file in whole.iterdir()})
+
+    def test_what_becomes_of_files_meanwhile(self):
+        """One that is removed or replaced ends the export; a folder that is put in the place of its own stays as it is."""
+        self.call("run", self.scene, "--no-render", "--out", "long", "--set", "time.steps=240")
+        whole = ("export", "long", "--to", "raw", "--to", "vti", "-o", "own")
+        for act in ("remove", "replace", "exchange"):
+            self.call("export", "long", "--to", "raw", "--to", "vti", "-o", "other")
+            self.call(*whole)
+            if act == "exchange":
+                for path in sorted((self.folder / "long/density").glob("*.vdb"))[2:]:
+                    shutil.copy(self.folder / "long/density/tiny_0001.vdb", path)
+            else:
+                shutil.rmtree(self.folder / "own")
+            before = {file.name: file.read_bytes() for file in (self.folder / "other").iterdir()}
+            environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "fsync STOP 1 1", "FAIL_PATH": "tiny_0006"}
+            process = subprocess.Popen([NEPHOS, *whole], cwd=self.folder, env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+            os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+            if act == "exchange":
+                (self.folder / "own").rename(self.folder / "away")
+                (self.folder / "other").rename(self.folder / "own")
+            elif act == "remove":
+                (self.folder / "own/tiny_0001.raw").unlink()
+            else:
+                (self.folder / "own/tiny_0001.raw").write_text("mine")
+            process.send_signal(signal.SIGCONT)
+            error = process.communicate(timeout=120)[1]
+            self.assertEqual(process.returncode, 3, error)
+            self.assertIn("was removed or", error)
+            if act == "exchange":
+                self.assertEqual({file.name: file.read_bytes() for file in (self.folder / "own").iterdir() if file.is_file()}, before)
+            else:
+                self.assertIn("tiny_0001.raw", error)
+                self.call(*whole)
+                self.call("verify", "own")
+                shutil.rmtree(self.folder / "own")
+            shutil.rmtree(self.folder / "other", ignore_errors=True)
 
     def test_what_an_export_refuses_leaves_the_one_before_complete(self):
         folder = self.export("out", "--to", "raw")
