@@ -75,11 +75,11 @@ DensityGrid FrameWriter::refined(const DensityGrid& density, const std::optional
     return resample(density, options.refine, options.metaball_radius_cells, boundaries);
 }
 
-VdbMetadata FrameWriter::metadata_of(const FrameResult& frame, const StateHash& hash,
-                                     std::optional<std::size_t> layer, const DensityGrid& density) const {
-    VdbMetadata metadata = density_metadata(scene_, frames_hash_, frame.time_s, hash);
-    metadata.period_m = period_m(scene_, layer);
-    metadata.wind = wind_levels(scene_, layer, density.placement(), density.extent(), frame.time_s);
+VdbMetadata frame_metadata(const Scene& scene, std::string frames_hash, double time_s, const StateHash& hash,
+                           std::optional<std::size_t> layer, const DensityGrid& density) {
+    VdbMetadata metadata = density_metadata(scene, std::move(frames_hash), time_s, hash);
+    metadata.period_m = period_m(scene, layer);
+    metadata.wind = wind_levels(scene, layer, density.placement(), density.extent(), time_s);
     return metadata;
 }
 
@@ -106,7 +106,7 @@ WrittenFile FrameWriter::write(const FrameResult& frame, VdbContent content, std
     const std::filesystem::path path =
         layer ? folder_.density(frame.number, frame.layers[*layer].name) : folder_.density(frame.number);
     content.publish_check = guard_;
-    write_vdb(path, content, metadata_of(frame, hash, layer, density));
+    write_vdb(path, content, frame_metadata(scene_, frames_hash_, frame.time_s, hash, layer, density));
     return {path, file_digest(path), voxel_digest(density, content.half)};
 }
 

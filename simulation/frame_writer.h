@@ -55,8 +55,6 @@ class FrameWriter {
     WrittenFile write(const FrameResult& frame, VdbContent content, std::optional<std::size_t> layer) const;
     DensityGrid refined(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
                         std::optional<std::size_t> layer, const Boundaries& boundaries, double time_s) const;
-    VdbMetadata metadata_of(const FrameResult& frame, const StateHash& hash, std::optional<std::size_t> layer,
-                            const DensityGrid& density) const;
 
     Scene scene_;
     RunFolder folder_;
@@ -69,9 +67,13 @@ class FrameWriter {
     double exposed_ev_ = 0;  // of that frame, stops
 };
 
-// Returns the metadata of a density file of a scene with this frames_hash(), of the moment `time_s` whose state has this
-// hash.
+// Returns the metadata of a file of a scene with this frames_hash(), of the moment `time_s` whose state has this hash: without
+// wind and lengths of repetition, as of a state.
 VdbMetadata density_metadata(const Scene& scene, std::string frames_hash, double time_s,
                              const StateHash& hash);
+
+// Returns those of the density of a layer, or of all together, with its wind, and the lengths after which it repeats.
+VdbMetadata frame_metadata(const Scene& scene, std::string frames_hash, double time_s, const StateHash& hash,
+                           std::optional<std::size_t> layer, const DensityGrid& density);
 
 }  // namespace nephos

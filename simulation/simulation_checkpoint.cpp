@@ -177,7 +177,7 @@ Checkpoint Simulation::save() {
             for (const BitPlane* plane : saved_planes(*layer.planes)) append_plane(bytes, *plane);
         }
     }
-    return {simulation_hash_, steps_taken(), combined_hash(layers_), saved_layers(layers_), std::move(bytes)};
+    return {simulation_hash_, steps_taken(), history_.back().hash, saved_layers(layers_), std::move(bytes)};
 }
 
 SavedPoint saved_point(const Checkpoint& checkpoint) {
@@ -196,17 +196,12 @@ SavedPoint saved_point(const Checkpoint& checkpoint) {
 void Simulation::restore(const Checkpoint& checkpoint, Restart restart) {
     restore_layers(checkpoint);
     restore_history(checkpoint, restart);
-    Past& present = history_.back();
+    // The hash of a veil is made of its options, which a branch may change: what was reported of this step stays.
     std::vector<StateHash> hashes;
-    for (std::size_t n = 0; n < layers_.size(); ++n) {
-        // The hash of a veil is made of its options, which a branch may change.
-        const bool is_as_saved = restart == Restart::same || !layers_[n].is_veil();
-        hashes.push_back(is_as_saved ? layers_[n].hash() : present.layers[n].hash);
-        present.layers[n].hash = layers_[n].hash();
-    }
+    for (std::size_t n = 0; n < layers_.size(); ++n)
+        hashes.push_back(layers_[n].is_veil() ? history_.back().layers[n].hash : layers_[n].hash());
     if (steps_taken() != checkpoint.steps || combined_hash(hashes) != checkpoint.state)
         throw Error(ErrorCode::io, "the checkpoint's state does not have the hash that it names");
-    present.hash = combined_hash(layers_);
 }
 
 // The layers' states one after the other, each with its length before it.

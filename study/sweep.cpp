@@ -56,12 +56,12 @@ Descriptor open_timing(const std::filesystem::path& path) {
 // Appends the time that a shard took. Returns the system's error, 0 without one.
 int add_timing(const Descriptor& file, const SweepJob& job, int workers, std::uint64_t runs, double wall_s) {
     struct stat status {};
-    const bool is_known = ::fstat(file.get(), &status) == 0;
-    const std::string text = fmt::format(
-        "{}{},{},{},{},{:.3f}\n", is_known && status.st_size == 0 ? "shard,shards,workers,runs,wall_s\n" : "",
-        job.shard, job.shards, workers, runs, wall_s);
+    if (::fstat(file.get(), &status) != 0) return errno;
+    const std::string text =
+        fmt::format("{}{},{},{},{},{:.3f}\n", status.st_size == 0 ? "shard,shards,workers,runs,wall_s\n" : "",
+                    job.shard, job.shards, workers, runs, wall_s);
     const int error = write_all(file.get(), std::as_bytes(std::span(text)));
-    if (error != 0 && is_known) {
+    if (error != 0) {
         [[maybe_unused]] const int ignored = ::ftruncate(file.get(), status.st_size);
     }
     return error;

@@ -197,11 +197,15 @@ void shortcuts(Editor& editor) {
     }
 }
 
-// Throws Error(usage) where a picture would replace the scene, or a file that it names.
+// Throws Error(usage) where a picture would replace the scene, or a file that it names: while the text has problems, one whose name
+// stands in it.
 void refuse_own_files(const Editor& editor, const std::filesystem::path& picture) {
-    if (editor.document->has_file()) refuse_to_replace(editor.document->path(), picture);
-    if (const Scene* const scene = editor.document->current_scene())
+    const SceneDocument& document = *editor.document;
+    if (document.has_file()) refuse_to_replace(document.path(), picture);
+    if (const Scene* const scene = document.current_scene())
         refuse_to_replace_files_of(*scene, picture);
+    else if (document.text().find(picture.filename().string()) != std::string::npos)
+        refuse_to_replace(picture, picture);
 }
 
 void save_capture(Editor& editor) {

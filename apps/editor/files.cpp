@@ -127,8 +127,11 @@ void start_export(Editor& editor, const fs::path& path) {
             const FrameResult& result = frame->frame;
             VdbContent content;
             content.density = &result.density;
+            content.cells = result.density.placement();
+            content.half = scene.density.half;
             write_vdb(state.path, content,
-                      density_metadata(scene, frames_hash(scene), result.time_s, result.hash));
+                      frame_metadata(scene, frames_hash(scene), result.time_s, result.hash, std::nullopt,
+                                     result.density));
         } catch (const std::exception& error) {
             state.failure = error.what();
         }

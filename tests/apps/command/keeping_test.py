@@ -303,7 +303,7 @@ class Keeping(Case):
         for first, second in (("a", "b"), ("c", "d")):
             with self.subTest(first):
                 begun = subprocess.Popen(["strace", "-f", "-qq", "-e", "trace=rename,renameat,renameat2", "-e",
-                                          "inject=rename,renameat,renameat2:delay_enter=500000", "-o", "/dev/null", NEPHOS, *map(str, self.plain),
+                                          "inject=rename,renameat,renameat2:delay_enter=1500000", "-o", "/dev/null", NEPHOS, *map(str, self.plain),
                                           "--out", first], cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
                 while begun.poll() is None and not (self.folder / first / "statistics.csv").exists():
                     time.sleep(0.01)

@@ -86,11 +86,13 @@ class Window(Case):
         script.write_text("wait 0.1\n", encoding="utf-8")
         Image.new("L", (4, 4), 255).save(picture)
         scene.write_text(scene.read_text(encoding="utf-8").replace("[ground]\n", '[ground]\nheight_map = "mask.png"\n'), encoding="utf-8")
-        for path in (scene, script, picture):
+        for path in (scene, script, picture, picture, picture):
             before = path.read_bytes()
             arguments = ["--script", script] if path == script else []
             self.assertIn("is the file that is read", self.edit(scene, "--screenshot", path, "--after", "0.2", *arguments, status=2))
             self.assertEqual(path.read_bytes(), before)
+            if path == picture:  # the second time the scene has a problem, the third it is no TOML
+                scene.write_text(scene.read_text(encoding="utf-8").replace("seed = ", "seed = -"), encoding="utf-8")
 
     def test_light_theme_and_large_text(self):
         picture = self.folder / "window.png"

@@ -159,6 +159,33 @@ class Opening(Kept):
         self.assertEqual((self.folder / "b.toml").read_text(encoding="utf-8"), STATE)
         self.assertEqual((self.folder / "a.toml").read_text(encoding="utf-8"), STATE.replace("4", "9"))
 
+    def test_an_exported_grid_is_the_frame_of_a_run(self):
+        """Of a tile with wind: the same voxels and metadata, the lengths after which it repeats among them."""
+        scene = self.folder / "t.toml"
+        scene.write_text('name = "t"\ntile = true\nseed = 7\n[lattice]\ncells = [16, 16, 8]\ncell_size_m = 100\norigin_m = [-800, -800, 1000]\n'
+                         '[field.background]\nhum = 0.1\nact = 0.05\next = 0.1\n'
+                         '[[wind]]\nlevels = [{ height_m = 1000, from_deg = 250, speed_m_per_s = 12 }]\n'
+                         '[time]\nstep_s = 10\nsteps = 40\n[frames]\nper_second = 1\ntime_scale = 10\n', encoding="utf-8")
+        self.edit(scene, script='wait-step 3\nkey SPACE\nwait 0.5\nclick "menu File"\nclick "menu Export the grid..."\nwait 0.3\n'
+                                'set "file name" g.vdb\nwait 1\n')
+        subprocess.run([NEPHOS, "run", scene, "--no-render", "-q", "-o", self.folder / "run"], check=True)
+        def grid(path):
+            said = subprocess.run([NEPHOS, "info", path, "--json"], capture_output=True, text=True, check=True)
+            return json.loads(said.stdout)["grids"][0]
+        found = grid(self.folder / "g.vdb")
+        step = round(float(found["metadata"]["nephos_time_s"]) / 10)
+        frame = self.folder / f"run/density/t_{step + 1:04}.vdb"
+        self.assertEqual(found, grid(frame))
+        self.assertIn("1600", str(found["metadata"]["nephos_period_m"]))
+        import numpy
+        import pyopenvdb
+        def voxels(path):
+            array = numpy.zeros((16, 16, 8), "f4")
+            pyopenvdb.read(str(path), "density").copyToArray(array)
+            return array
+        self.assertGreater(voxels(frame).max(), 0)
+        numpy.testing.assert_array_equal(voxels(self.folder / "g.vdb"), voxels(frame))
+
     def test_a_grid_has_the_scene_that_it_is_of(self):
         """Not the one that could not be simulated, whose text is in the window."""
         scene = self.two(STATE, STATE)
