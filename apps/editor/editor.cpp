@@ -14,6 +14,7 @@
 #include "apps/editor/state.h"
 #include "apps/nephos/arguments.h"
 #include "apps/nephos/commands.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "render/image/image_file.h"
 
@@ -197,15 +198,18 @@ void shortcuts(Editor& editor) {
     }
 }
 
-// Throws Error(usage) where a picture would replace the scene, or a file that it names: while the text has problems, one whose name
-// stands in it.
-void refuse_own_files(const Editor& editor, const std::filesystem::path& picture) {
+// Throws Error(usage) where a picture would replace the scene, or a file that it names; while the text has problems and nobody was
+// asked, anything.
+void refuse_own_files(const Editor& editor, const std::filesystem::path& picture, bool was_asked) {
     const SceneDocument& document = *editor.document;
     if (document.has_file()) refuse_to_replace(document.path(), picture);
     if (const Scene* const scene = document.current_scene())
         refuse_to_replace_files_of(*scene, picture);
-    else if (document.text().find(picture.filename().string()) != std::string::npos)
-        refuse_to_replace(picture, picture);
+    else if (!was_asked && is_there(picture))
+        throw Error(ErrorCode::usage,
+                    picture.string() +
+                        ": is there already, and may be a file of the scene, whose text has "
+                        "problems: expected the name of another one to write");
 }
 
 void save_capture(Editor& editor) {
@@ -214,7 +218,7 @@ void save_capture(Editor& editor) {
     const std::filesystem::path path = std::exchange(editor.capture_to, {});
     const bool by_user = std::exchange(editor.capture_by_user, false);
     try {
-        refuse_own_files(editor, path);
+        refuse_own_files(editor, path, by_user);
         save_rgba(path, image.width, image.height, image.rgba);
     } catch (const Error& error) {
         if (!by_user) throw;

@@ -169,6 +169,7 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     }
     for (ExportedFile& file : noted_files(folder_)) {
         std::string name = file.path.generic_string();
+        noted_.insert(name);
         if (type_behind(folder_ / name) == std::filesystem::file_type::regular &&
             file_digest(folder_ / name) == file.digest)
             earlier_[std::move(name)] = std::move(file);
@@ -178,7 +179,7 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
 void ExportList::require_free(const std::vector<std::string>& names) const {
     for (const std::string& name : names)
         if (!earlier_.contains(name) && stands_there(folder_ / name))
-            throw_place_taken(folder_ / name, was_interrupted_);
+            throw_place_taken(folder_ / name, was_interrupted_ && !noted_.contains(name));
 }
 
 void ExportList::begin() {
@@ -209,14 +210,10 @@ std::string ExportList::note_on_change(const std::string& name) const {
 ExportedFile ExportList::write_file(const std::string& name, const ExportSource& source,
                                     std::string_view format,
                                     const std::function<void(const std::filesystem::path& path)>& write) {
-    const std::filesystem::path path = work_.path_of(name);
     work_.require_in_place();
-    const std::function<void()> in_place = [this] { work_.require_in_place(); };
-    {
-        const PublishCheck keeps_in_place(in_place);
-        write(path);
-    }
-    ExportedFile file{name, file_digest(path), below_folder(source.path), std::string(format), source.digest};
+    work_.write(name, write);
+    ExportedFile file{name, work_.digest_of(name), below_folder(source.path), std::string(format),
+                      source.digest};
     work_.note(file);
     if (earlier_.contains(name) && stands_there(folder_ / name))
         work_.replace(name);

@@ -42,6 +42,13 @@ bool is_of_export(const std::filesystem::path& work) {
     return names.empty() || (std::ranges::count(names, kNotes) > 0 && std::ranges::all_of(names, is_file));
 }
 
+[[noreturn]] void throw_in_the_way(const std::filesystem::path& work) {
+    throw Error(ErrorCode::usage,
+                work.string() +
+                    ": is in the way, and no export of this user has made it: move it away, or "
+                    "choose another folder");
+}
+
 // Renames a file where nothing stands. Returns 0 or errno.
 int rename_to_free_place(int from_folder, const char* name, int to_folder) {
     if (::renameat2(from_folder, name, to_folder, name, RENAME_NOREPLACE) == 0) return 0;
@@ -86,34 +93,41 @@ std::vector<ExportedFile> noted_files(const std::filesystem::path& folder) {
 
 ExportWork::ExportWork(std::filesystem::path folder) : folder_(std::move(folder)) {
     const std::filesystem::path work = folder_ / kExportWork;
-    struct stat status {
-    }, list{};
+    struct stat status {};
     if (::lstat(work.c_str(), &status) != 0) {
         if (errno != ENOENT) fail(work, "cannot be examined", errno);
         return;
     }
-    // Whose list is believed may have notes, too: for root, and where a file system has one owner for all.
-    const bool is_of_list =
-        ::lstat((folder_ / "export.json").c_str(), &list) == 0 && list.st_uid == status.st_uid;
-    if (!S_ISDIR(status.st_mode) || (status.st_uid != ::geteuid() && !is_of_list) || !is_of_export(work))
-        throw Error(ErrorCode::usage,
-                    work.string() +
-                        ": is in the way, and no export of this user has made it: move it away, or "
-                        "choose another folder");
+    if (!S_ISDIR(status.st_mode) || !is_trusted_owner(status.st_uid) || !is_of_export(work))
+        throw_in_the_way(work);
+}
+
+// Whose list is believed may have notes, too: for root, and where a file system has one owner for all.
+bool ExportWork::is_trusted_owner(unsigned user) const {
+    struct stat list {};
+    return user == ::geteuid() ||
+           (::lstat((folder_ / "export.json").c_str(), &list) == 0 && list.st_uid == user);
 }
 
 void ExportWork::begin() {
     const std::filesystem::path work = folder_ / kExportWork;
-    std::error_code error;
-    for (const std::string& name : names_in_folder(work))
-        if (!error) std::filesystem::remove(work / name, error);
-    if (!error) std::filesystem::remove(work, error);
-    if (error) throw Error(ErrorCode::io, work.string() + ": cannot remove: " + error.message());
-    if (::mkdir(work.c_str(), 0700) != 0) fail(work, "cannot create", errno);
+    place_.reset(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (place_.get() < 0) fail(folder_, "cannot open", errno);
+    work_.reset(::openat(place_.get(), kExportWork, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+    if (work_.get() >= 0) {
+        struct stat status {};
+        if (::fstat(work_.get(), &status) != 0) fail(work, "cannot be examined", errno);
+        if (!is_trusted_owner(status.st_uid)) throw_in_the_way(work);  // put there since
+        clear();
+    } else if (errno != ENOENT) {
+        fail(work, "cannot open", errno);
+    }
+    if (::mkdirat(place_.get(), kExportWork, 0700) != 0) fail(work, "cannot create", errno);
     try {
         open();
     } catch (const Error&) {
-        std::filesystem::remove_all(work, error);
+        ::unlinkat(work_.get(), kNotes, 0);
+        ::unlinkat(place_.get(), kExportWork, AT_REMOVEDIR);
         work_.reset(-1);
         throw;
     }
@@ -121,8 +135,6 @@ void ExportWork::begin() {
 
 void ExportWork::open() {
     const std::filesystem::path work = folder_ / kExportWork;
-    place_.reset(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (place_.get() < 0) fail(folder_, "cannot open", errno);
     work_.reset(::openat(place_.get(), kExportWork, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
     if (work_.get() < 0) fail(work, "cannot open", errno);
     notes_.reset(
@@ -132,6 +144,44 @@ void ExportWork::open() {
         fail(work, "cannot flush to the device", failed);
     flush();
 }
+
+// Removes the folder that is held, and what is in it: the notes last, by which it is known.
+void ExportWork::clear() {
+    const std::filesystem::path work = folder_ / kExportWork;
+    const auto remove = [&](const char* name) {
+        if (::unlinkat(work_.get(), name, 0) != 0 && errno != ENOENT)
+            fail(work / name, "cannot remove", errno);
+    };
+    for (const std::string& name : names_in_folder(held_path_of({})))
+        if (name != kNotes) remove(name.c_str());
+    remove(kNotes);
+    if (::unlinkat(place_.get(), kExportWork, AT_REMOVEDIR) != 0 && errno != ENOENT)
+        fail(work, "cannot remove", errno);
+    work_.reset(-1);
+}
+
+// The path by its descriptor where the system has such paths.
+std::filesystem::path ExportWork::held_path_of(const std::string& name) const {
+    const std::filesystem::path held = "/proc/self/fd/" + std::to_string(work_.get());
+    std::error_code error;
+    return std::filesystem::is_directory(held, error) ? held / name : path_of(name);
+}
+
+void ExportWork::write(const std::string& name,
+                       const std::function<void(const std::filesystem::path& path)>& write) const {
+    const std::filesystem::path held = held_path_of(name);
+    try {
+        write(held);
+    } catch (const Error& error) {
+        std::string text = error.what();
+        const std::string folder = held.parent_path().string();
+        const std::size_t at = text.find(folder);
+        if (at == text.npos) throw;
+        throw Error(error.code(), text.replace(at, folder.size(), (folder_ / kExportWork).string()));
+    }
+}
+
+FileDigest ExportWork::digest_of(const std::string& name) const { return file_digest(held_path_of(name)); }
 
 void ExportWork::note(const ExportedFile& file) {
     // Behind one that a full disk has torn it is a line of its own, too.
@@ -148,6 +198,8 @@ void ExportWork::note(const ExportedFile& file) {
 void ExportWork::place(const std::string& name) {
     const int error = rename_to_free_place(work_.get(), name.c_str(), place_.get());
     if (error == 0) return;
+    // Some unions of file systems rename within a folder alone.
+    if (error == EXDEV && !stands_there(folder_ / name)) return replace(name);
     ::unlinkat(work_.get(), name.c_str(), 0);
     if (error == EEXIST) throw_place_taken(folder_ / name);
     fail(folder_ / name, "cannot rename into place", error);
@@ -163,7 +215,7 @@ void ExportWork::require_in_place() const {
 void ExportWork::replace(const std::string& name) {
     const std::function<void()> check = [this] { require_in_place(); };
     const PublishCheck keeps_in_place(check);
-    copy_atomically(path_of(name), folder_ / name);
+    copy_atomically(held_path_of(name), folder_ / name);
     ::unlinkat(work_.get(), name.c_str(), 0);
 }
 
@@ -175,16 +227,7 @@ void ExportWork::flush() const {
 
 void ExportWork::end() {
     notes_.reset(-1);
-    if (work_.get() < 0) return;
-    const std::filesystem::path work = folder_ / kExportWork;
-    ::unlinkat(work_.get(), kNotes, 0);
-    if (::unlinkat(place_.get(), kExportWork, AT_REMOVEDIR) != 0 && errno != ENOENT) {
-        // A failure has left files in it. By its path only where that is still the folder that was made.
-        std::error_code error;
-        if (is_same_file(work_.get(), work)) std::filesystem::remove_all(work, error);
-        if (error) throw Error(ErrorCode::io, work.string() + ": cannot remove: " + error.message());
-    }
-    work_.reset(-1);
+    if (work_.get() >= 0) clear();
     place_.reset(-1);
 }
 

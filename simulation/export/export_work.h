@@ -5,6 +5,7 @@
 // from others' (not installed).
 
 #include <filesystem>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -37,8 +38,12 @@ class ExportWork {
     void begin();
     // Throws Error(io) when the folder or the hidden one is not in its place any more: another might be.
     void require_in_place() const;
-    // Returns where a file is to be written.
-    std::filesystem::path path_of(const std::string& name) const { return folder_ / kExportWork / name; }
+    // Calls `write` with a path in the hidden folder, which leads there also when that is moved or another is put in its place.
+    // Exceptions of `write` pass through, with the folder's name.
+    void write(const std::string& name,
+               const std::function<void(const std::filesystem::path& path)>& write) const;
+    // Returns the checksum of a file that was written there. Throws Error(io).
+    FileDigest digest_of(const std::string& name) const;
     // Notes a file that was written there, and flushes the note to the device. Thread-safe. Throws Error(io).
     void note(const ExportedFile& file);
     // Gives a noted file its place. Thread-safe. Throws Error(io); Error(usage) naming what stands there.
@@ -52,6 +57,10 @@ class ExportWork {
 
   private:
     void open();
+    std::filesystem::path path_of(const std::string& name) const { return folder_ / kExportWork / name; }
+    std::filesystem::path held_path_of(const std::string& name) const;
+    bool is_trusted_owner(unsigned user) const;
+    void clear();
 
     std::filesystem::path folder_;
     Descriptor place_, work_, notes_;  // the folder, the hidden one, and the file of notes in it

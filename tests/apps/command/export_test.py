@@ -493,6 +493,24 @@ class Export(Case):
         (self.folder / "out/.nephos-export/mine").unlink()
         self.export("out", "--to", "raw")
 
+    def test_a_link_in_place_of_the_hidden_folder_is_not_followed(self):
+        """Also where it is put there when an export has begun to go on."""
+        (self.folder / "victim").mkdir()
+        (self.folder / "victim/letter.txt").write_text("mine")
+        self.killed("rename", 2, "out/placed_", "--to", "raw", "-o", "out")
+        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename STOP 1 1", "FAIL_PATH": "export.json"}
+        process = subprocess.Popen([NEPHOS, "export", "run", "--to", "raw", "-o", "out"], cwd=self.folder, env=environment,
+                                   stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+        (self.folder / "out/.nephos-export").rename(self.folder / "away")
+        (self.folder / "out/.nephos-export").symlink_to("../victim")
+        process.send_signal(signal.SIGCONT)
+        error = process.communicate(timeout=60)[1]
+        self.assertEqual((process.returncode, (self.folder / "victim/letter.txt").read_text()), (3, "mine"), error)
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
+        (self.folder / "out/.nephos-export").unlink()
+        self.export("out", "--to", "raw")
+
     def test_notes_of_others(self):
         """Damaged, very long or none at all, they let nothing in and take no memory."""
         whole = self.export("whole", "--to", "raw")
