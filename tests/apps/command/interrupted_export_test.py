@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`nephos export` that is killed, stopped, refused or met by files of others: which files it takes for its own (docs/adr/0038-noted-exports.md)."""
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+from case import NEPHOS, Case, limit_addresses
+from verify_test import PLACED
+
+
+class InterruptedExport(Case):
+    def setUp(self):
+        super().setUp()
+        self.call("run", self.write("placed.toml", PLACED), "--no-render", "--out", "run")
+
+    def export(self, folder, *arguments):
+        self.call("export", "run", "-o", folder, *arguments)
+        self.call("verify", folder)
+        return self.folder / folder
+
+    KINDS = (["--for", "blender"], ["--for", "unreal"], ["--to", "vdb", "--voxel", "200"], ["--to", "raw", "--to", "layers", "--to", "cigi"],
+             ["--to", "usd", "--to", "vdb"], ["--to", "nvdb"], ["--to", "vti"], ["--for", "flightgear"])
+
+    def killed(self, call, first, path, *arguments):
+        """An export that is killed at a call of the system on files with this in their path."""
+        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"{call} KILL {first} 1", "FAIL_PATH": path}
+        done = subprocess.run([NEPHOS, "export", "run", *arguments], cwd=self.folder, env=environment, capture_output=True, check=False)
+        self.assertEqual(done.returncode, -signal.SIGKILL, done.stderr)
+
+    def test_a_killed_export_knows_its_files(self):
+        """It goes on, whatever it writes and wherever it was killed, and what is there in the end is what an undisturbed one has written."""
+        for kind, arguments in enumerate(self.KINDS):
+            whole = self.export(f"whole-{kind}", *arguments)
+            for call, first, path in (("rename", 3, "placed_"), ("rename", 4, "placed_"), ("rename", 1, "README"), ("fsync", 2, "notes")):
+                out = self.folder / f"out-{kind}-{call}-{first}"
+                self.killed(call, first, path, *arguments, "-o", out)
+                self.call("export", "run", *arguments, "-o", out)
+                self.assertEqual({file.name: file.read_bytes() for file in out.iterdir()}, {file.name: file.read_bytes() for file in whole.iterdir()}, out)
+                shutil.rmtree(out)
+
+    def test_a_killed_export_takes_no_file_of_others_for_its_own(self):
+        """Volumes, texts and weather that somebody put where it had not come to, as a file or a link, stay, however often it is called."""
+        arguments = ["--to", "raw", "--to", "layers", "-o", "out"]
+        folder, elsewhere = self.folder / "out", self.folder / "diary.txt"
+        elsewhere.write_text("mine")
+        for call, first, path in (("rename", 3, "placed_"), ("rename", 1, "README")):
+            for name in ("README.txt", "placed.layers.json", "placed_0004.raw"):
+                for is_link in (False, True):
+                    self.killed(call, first, path, *arguments)
+                    left = folder / name
+                    if left.exists():  # it had come to this one
+                        self.assertEqual((path, name), ("README", "placed_0004.raw") if name.endswith("raw") else ("README", "placed.layers.json"))
+                        shutil.rmtree(folder)
+                        continue
+                    left.symlink_to(elsewhere) if is_link else left.write_text("mine")
+                    for _ in range(3):
+                        self.refused(2, "export", "run", *arguments, says=f"{name}: is there already, and no export of this has listed it")
+                        self.assertEqual((left.read_text(), elsewhere.read_text(), left.is_symlink()), ("mine", "mine", is_link))
+                    left.unlink()
+                    self.call("export", "run", *arguments)
+                    self.call("verify", "out")
+                    shutil.rmtree(folder)
+
+    def test_a_killed_export_knows_what_it_has_made_again(self):
+        """Files of a list that are made again, of other frames or another source, are noted as well: one that asks for less removes them."""
+        for call, path, changes in (("rename", "placed.volume.json", False), ("fsync", "placed_0003", True)):
+            folder = self.export("out", "--to", "raw", "--to", "layers", "--frames", "1..4" if changes else "1..3")
+            if changes:
+                for number in (1, 2, 3):
+                    shutil.copy(self.folder / "run/density/placed_0004.vdb", self.folder / f"run/density/placed_000{number}.vdb")
+            try:
+                self.killed(call, 1, path, "--to", "raw", "--to", "layers", "-o", "out")
+                said = self.call("export", "run", "--to", "raw", "--frames", "1..2", "-o", "out").stderr
+                self.assertNotIn("changed since", said)
+                self.call("verify", "out")
+                self.assertEqual({file.name for file in folder.iterdir()},
+                                 {"README.txt", "export.json", "placed.volume.json", "placed_0001.raw", "placed_0002.raw"})
+                self.export("out", "--to", "raw", "--to", "layers")
+            finally:
+                shutil.rmtree(folder)
+
+    def test_every_preset_takes_every_summary_of_weather(self):
+        """Also one that it writes by itself, or that is named twice."""
+        for preset in ("blender", "flightgear", "msfs", "xplane", "cigi"):
+            for form in ("layers", "metar", "xplane", "wpr", "cigi"):
+                self.export(f"{preset}-{form}", "--for", preset, "--to", form, "--to", form)
+
+    def test_an_interrupted_export_without_its_notes(self):
+        """It says how it may go on, and removes nothing of others."""
+        self.killed("rename", 2, "out/placed_", "--to", "raw", "-o", "out")
+        shutil.rmtree(self.folder / "out/.nephos-export")
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="if the one that was interrupted has written it, whose notes are not there, remove it")
+        (self.folder / "out/.nephos-export/mine").mkdir(parents=True)
+        for path in (self.folder / "out").glob("*.raw"):
+            path.unlink()
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
+        (self.folder / "out/.nephos-export/mine").rmdir()
+        (self.folder / "out/.nephos-export/mine").write_text("mine")
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
+        (self.folder / "out/.nephos-export/mine").unlink()
+        self.export("out", "--to", "raw")
+
+    def test_a_link_in_place_of_the_hidden_folder_is_not_followed(self):
+        """Also where it is put there when an export has begun to go on."""
+        (self.folder / "victim").mkdir()
+        (self.folder / "victim/letter.txt").write_text("mine")
+        self.killed("rename", 2, "out/placed_", "--to", "raw", "-o", "out")
+        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename STOP 1 1", "FAIL_PATH": "export.json"}
+        process = subprocess.Popen([NEPHOS, "export", "run", "--to", "raw", "-o", "out"], cwd=self.folder, env=environment,
+                                   stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+        (self.folder / "out/.nephos-export").rename(self.folder / "away")
+        (self.folder / "out/.nephos-export").symlink_to("../victim")
+        process.send_signal(signal.SIGCONT)
+        error = process.communicate(timeout=60)[1]
+        self.assertEqual((process.returncode, (self.folder / "victim/letter.txt").read_text()), (3, "mine"), error)
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
+        (self.folder / "out/.nephos-export").unlink()
+        self.export("out", "--to", "raw")
+
+    def test_notes_of_others(self):
+        """Damaged, very long or none at all, they let nothing in and take no memory."""
+        whole = self.export("whole", "--to", "raw")
+        for number, notes in enumerate((b"\0" * 100, b"[" * 100_000, b'{"path": "../run/manifest.json", "bytes": 1, "xxh3": "0"}\n', b"", None)):
+            self.killed("rename", 2, f"out-{number}/placed_", "--to", "raw", "-o", f"out-{number}")
+            path = self.folder / f"out-{number}/.nephos-export/notes.jsonl"
+            path.write_bytes(notes or b"")
+            if notes is None:
+                os.truncate(path, 100 << 30)
+            done = subprocess.run([NEPHOS, "export", "run", "--to", "raw", "-o", f"out-{number}"], cwd=self.folder, env=self.environment,
+                                  capture_output=True, text=True, check=False, preexec_fn=lambda: limit_addresses(2 << 30))
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn("whose notes are not there", done.stderr)
+            for path in (self.folder / f"out-{number}").glob("*.raw"):
+                path.unlink()
+            self.export(f"out-{number}", "--to", "raw")
+            self.assertEqual({file.name: file.read_bytes() for file in (self.folder / f"out-{number}").iterdir()},
+                             {file.name: file.read_bytes() for file in whole.iterdir()})
+
+    def test_what_becomes_of_files_meanwhile(self):
+        """One that is removed or replaced ends the export; a folder that is put in the place of its own stays as it is."""
+        self.call("run", self.scene, "--no-render", "--out", "long", "--set", "time.steps=240")
+        whole = ("export", "long", "--to", "raw", "--to", "vti", "-o", "own")
+        for act in ("remove", "replace", "exchange"):
+            self.call("export", "long", "--to", "raw", "--to", "vti", "-o", "other")
+            self.call(*whole)
+            if act == "exchange":
+                for path in sorted((self.folder / "long/density").glob("*.vdb"))[2:]:
+                    shutil.copy(self.folder / "long/density/tiny_0001.vdb", path)
+            else:
+                shutil.rmtree(self.folder / "own")
+            before = {file.name: file.read_bytes() for file in (self.folder / "other").iterdir()}
+            environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "fsync STOP 1 1", "FAIL_PATH": "tiny_0006"}
+            process = subprocess.Popen([NEPHOS, *whole], cwd=self.folder, env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+            os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+            if act == "exchange":
+                (self.folder / "own").rename(self.folder / "away")
+                (self.folder / "other").rename(self.folder / "own")
+            elif act == "remove":
+                (self.folder / "own/tiny_0001.raw").unlink()
+            else:
+                (self.folder / "own/tiny_0001.raw").write_text("mine")
+            process.send_signal(signal.SIGCONT)
+            error = process.communicate(timeout=120)[1]
+            self.assertEqual(process.returncode, 3, error)
+            self.assertIn("was removed or", error)
+            if act == "exchange":
+                self.assertEqual({file.name: file.read_bytes() for file in (self.folder / "own").iterdir() if file.is_file()}, before)
+            else:
+                self.assertIn("tiny_0001.raw", error)
+                self.call(*whole)
+                self.call("verify", "own")
+                shutil.rmtree(self.folder / "own")
+            shutil.rmtree(self.folder / "other", ignore_errors=True)
+
+    def test_what_an_export_refuses_leaves_the_one_before_complete(self):
+        folder = self.export("out", "--to", "raw")
+        before = {path.name: path.read_bytes() for path in folder.iterdir()}
+        (folder / "placed.layers.json").write_text("mine")
+        for _ in range(2):
+            self.refused(2, "export", "run", "--to", "raw", "--to", "layers", "-o", "out", says="placed.layers.json: is there already")
+        (folder / "placed.layers.json").unlink()
+        self.assertEqual({path.name: path.read_bytes() for path in folder.iterdir()}, before)
+        self.call("verify", "out")
+        (folder / ".nephos-export").symlink_to(self.folder)  # its own hidden folder
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
+        self.assertIn("listed nowhere", self.call("verify", "out", status=1).stdout)
+        (folder / ".nephos-export").unlink()
+        self.call("verify", "out")
+
+    def test_files_that_are_put_there_meanwhile_stay(self):
+        """Under a name that was free when the export began."""
+        self.call("run", self.scene, "--no-render", "--out", "long", "--set", "time.steps=300")
+        process = subprocess.Popen([NEPHOS, "export", "long", "--to", "vti", "--zip", "-o", "met"], cwd=self.folder,
+                                   env=self.environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        while process.poll() is None and not (self.folder / "met/tiny_0003.vti").exists():
+            time.sleep(0.001)
+        process.send_signal(signal.SIGSTOP)
+        last = self.folder / "met" / max((self.folder / "long/density").glob("*.vdb")).with_suffix(".vti").name
+        self.assertFalse(last.exists())
+        last.write_text("mine")
+        process.send_signal(signal.SIGCONT)
+        error = process.communicate(timeout=120)[1]
+        self.assertEqual((process.returncode, last.read_text()), (2, "mine"), error)
+        self.assertIn(f"{last.name}: is there already", error)
+        last.unlink()
+        self.call("export", "long", "--to", "vti", "--zip", "-o", "met")
+        self.call("verify", "met")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
