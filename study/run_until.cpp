@@ -122,7 +122,7 @@ UntilReport run_until(RunSettings settings, const StopAt& stop, std::uint64_t ma
     // Parts that an earlier call has finished were followed by longer ones.
     if (settings.resume) steps = std::clamp(steps_before(settings), steps, std::max(steps, max_steps));
     UntilReport report;
-    // Of what was read at the beginning, whatever becomes of the files: all parts are of that.
+    // Keeps what was read at the beginning, whatever becomes of the files: all parts are of that.
     keep_inputs(settings);
     while (true) {
         RunSettings part = settings;

@@ -251,7 +251,7 @@ void ExportList::write(bool complete) const {
     for (const ExportedFile& file : files_) add(file.path.generic_string(), file);
     if (!complete) {
         for (const auto& [name, file] : made_) add(name, file);
-        // What an earlier export wrote is not to be written again after a second interruption.
+        // Keeps what an earlier export wrote, which is not to be written again after a second interruption.
         for (const auto& [name, file] : earlier_) add(name, file);
     }
     json["files"] = std::move(files);

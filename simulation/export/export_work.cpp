@@ -102,7 +102,7 @@ ExportWork::ExportWork(std::filesystem::path folder) : folder_(std::move(folder)
         throw_in_the_way(work);
 }
 
-// Whose list is believed may have notes, too: for root, and where a file system has one owner for all.
+// Trusts who has written the list with notes, too: for root, and where a file system has one owner for all.
 bool ExportWork::is_trusted_owner(unsigned user) const {
     struct stat list {};
     return user == ::geteuid() ||

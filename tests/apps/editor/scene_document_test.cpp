@@ -363,7 +363,7 @@ TEST(SceneDocument, EditsOfASceneWhoseFolderCannotBeWrittenAreKeptElsewhere) {
     EXPECT_TRUE(SceneDocument(two / "a.toml").left_autosaves(settings).empty());
 }
 
-// Of a scene that had no file before, or one in another folder, as a copy: they are of the file that it was saved as.
+// Keeps the edits of a new scene, or of a copy, as those of the file that it was saved as.
 TEST(SceneDocument, EditsKeptElsewhereAreOfTheFileThatWasSaved) {
     const Folder folder;
     const std::filesystem::path settings = folder.path / "settings", one = folder.path / "one",
