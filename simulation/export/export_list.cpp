@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/export/export_list.h"
 
-#include <algorithm>
 #include <cstdint>
-#include <set>
 #include <system_error>
 #include <vector>
 
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "core/atomic_file.h"
-#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/paths.h"
 #include "simulation/checked_json.h"

@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <functional>
 #include <span>
 #include <sstream>
 #include <system_error>
@@ -160,7 +159,7 @@ void ExportWork::clear() {
     work_.reset(-1);
 }
 
-// The path by its descriptor where the system has such paths.
+// Returns the path by the folder's descriptor where the system has such paths.
 std::filesystem::path ExportWork::held_path_of(const std::string& name) const {
     const std::filesystem::path held = "/proc/self/fd/" + std::to_string(work_.get());
     std::error_code error;
@@ -201,7 +200,7 @@ void ExportWork::place(const std::string& name) {
     // Some unions of file systems rename within a folder alone.
     if (error == EXDEV && !stands_there(folder_ / name)) return replace(name);
     ::unlinkat(work_.get(), name.c_str(), 0);
-    if (error == EEXIST) throw_place_taken(folder_ / name);
+    if (error == EEXIST || error == EXDEV) throw_place_taken(folder_ / name);
     fail(folder_ / name, "cannot rename into place", error);
 }
 
