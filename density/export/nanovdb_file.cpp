@@ -169,7 +169,7 @@ DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const
     const int kept[] = {file.get()};
     DensityGrid density;
     run_sandboxed(
-        path, "NanoVDB", {kSeconds, memory, memory}, kept,
+        path, "NanoVDB", {.seconds = kSeconds, .memory_bytes = memory, .most_bytes = memory}, kept,
         [&](SandboxWriter& writer) {
             try {
                 send_grid(file.get(), extent, writer);

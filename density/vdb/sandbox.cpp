@@ -66,7 +66,7 @@ class TimeAllowed {
     Clock::time_point looked_ = Clock::now();
 };
 
-// Thrown inside run_sandboxed when the child seems to wait for a lock that nobody holds.
+// Thrown inside run_sandboxed when the child seems to wait for a lock that nobody holds, asleep or not.
 struct Stalled {};
 
 // In the child.
@@ -122,7 +122,9 @@ class PipeReader final : public SandboxReader {
           memory_(limits.memory_bytes),
           most_(limits.most_bytes),
           time_(time),
-          watch_for_stall_(!last_attempt),
+          quiet_seconds_(limits.quiet_seconds),
+          quiet_(limits.quiet_seconds),
+          may_restart_(!last_attempt),
           quiet_since_(Clock::now()) {}
 
     void bytes(void* data, std::size_t size) override {
@@ -181,7 +183,9 @@ class PipeReader final : public SandboxReader {
 
     // Reads what has come: values of a few bytes one by one would cost two system calls each.
     void refill() {
-        time_.skip();  // what the caller did with the last of it is not the child's time
+        // What the caller did with the last of it is not the child's time.
+        time_.skip();
+        quiet_ = TimeAllowed(quiet_seconds_);
         for (;;) {
             wait_for_data();
             time_.count();
@@ -191,7 +195,7 @@ class PipeReader final : public SandboxReader {
                 throw std::runtime_error(std::string(kCannotRead) +
                                          "cannot hear the reading process: " + std::strerror(errno));
             if (got == 0) throw std::runtime_error("");  // the child is gone: its status says why
-            watch_for_stall_ = false;
+            may_restart_ = false;
             at_ = 0;
             arrived_ = std::size_t(got);
             return;
@@ -201,12 +205,18 @@ class PipeReader final : public SandboxReader {
     void wait_for_data() {
         for (;;) {
             time_.count();
+            quiet_.count();
             if (time_.is_over()) throw std::runtime_error(kTooLong);
-            const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(time_.left()).count() + 1;
+            if (quiet_.is_over()) {
+                if (may_restart_) throw Stalled();
+                throw std::runtime_error(kTooLong);
+            }
+            const Clock::duration least = std::min(time_.left(), quiet_.left());
+            const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(least).count() + 1;
             pollfd poll_fd{fd_, POLLIN, 0};
             const int ready = ::poll(&poll_fd, 1, int(std::min<long long>(left, 500)));
             if (ready > 0) return;
-            if (ready == 0 && watch_for_stall_) check_stall();
+            if (ready == 0 && may_restart_) check_stall();
         }
     }
 
@@ -225,7 +235,9 @@ class PipeReader final : public SandboxReader {
     std::size_t memory_;
     std::size_t most_;  // bytes that may still come
     TimeAllowed& time_;
-    bool watch_for_stall_;
+    const double quiet_seconds_;
+    TimeAllowed quiet_;
+    bool may_restart_;  // nothing has come, and it is not the last attempt
     Clock::time_point quiet_since_;
     long used_ = -1;
     std::size_t left_ = 0;  // bytes of the present chunk that were not yet taken

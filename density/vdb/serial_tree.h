@@ -2,7 +2,9 @@
 #pragma once
 
 // Does with one thread what OpenVDB does with trees in parallel: in a forked process the threads of oneTBB are not there, and what
-// waits for a lock that one of them held at that moment waits for ever. Private to density/vdb.
+// waits for a lock that one of them held at that moment waits for ever. The memory of oneTBB has such locks, too: accessors that
+// a tree knows take it, those that getUnsafeAccessor() returns do not. The tests faults.ForkedReaders notice either.
+// Private to density/vdb.
 
 #include <cstdint>
 #include <exception>

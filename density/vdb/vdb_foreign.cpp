@@ -119,6 +119,9 @@ class Permuter {
   public:
     Permuter(const CoordBBox& bounds, const AxisMap& map, const DensityReceiver& receiver)
         : bounds_(bounds), map_(map), receiver_(receiver), work_(0.0f), voxels_(work_) {}
+    Permuter(const Permuter&) = delete;
+    Permuter& operator=(const Permuter&) = delete;
+    ~Permuter() { work_.root().clear(); }  // by this thread alone, as in serial_tree.h
 
     ForeignResult run(const FloatTree& tree) {
         const bool blocks_stay =
@@ -214,7 +217,8 @@ class Permuter {
     const AxisMap map_;
     const DensityReceiver& receiver_;
     FloatTree work_;
-    openvdb::tree::ValueAccessor<FloatTree> voxels_;
+    openvdb::tree::ValueAccessor<FloatTree, false>
+        voxels_;  // false: not known to the tree, as in serial_tree.h
     Sanitiser sanitise_;
 };
 
@@ -234,7 +238,7 @@ class Skewed {
 
     ForeignResult run(const DensityReceiver& receiver) {
         receiver.begin(extent_, {{low_.x(), low_.y(), low_.z()}, edge_});
-        const auto accessor = foreign_.grid->getConstAccessor();
+        const auto accessor = foreign_.grid->getConstUnsafeAccessor();
         Sanitiser sanitise;
         for (const Coord& origin : blocks()) {
             float values[kBlockVoxels] = {};

@@ -68,7 +68,7 @@ Points points_of(const openvdb::GridBase& grid, const Coord& low) {
 template <class Grid>
 void send_values(const openvdb::GridBase& base, const CoordBBox& box, int parts, SandboxWriter& writer) {
     const auto& grid = static_cast<const Grid&>(base);
-    const auto accessor = grid.getConstAccessor();
+    const auto accessor = grid.getConstUnsafeAccessor();
     for (int k = box.min().z(); k <= box.max().z(); ++k) {
         for (int j = box.min().y(); j <= box.max().y(); ++j) {
             for (int i = box.min().x(); i <= box.max().x(); ++i) {

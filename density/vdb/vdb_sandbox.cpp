@@ -93,7 +93,10 @@ void in_sandbox(std::span<const std::filesystem::path> paths, const VdbReadLimit
         bound = std::max(bound, memory_bound(path));
     }
     const double count = double(paths.size());
-    SandboxLimits bounded{std::min(1e6, limits.seconds * count), memory_limit(limits), 0};
+    SandboxLimits bounded{.seconds = std::min(1e6, limits.seconds * count),
+                          .quiet_seconds = limits.seconds,  // each file sends something
+                          .memory_bytes = memory_limit(limits),
+                          .most_bytes = 0};
     const bool by_size = limits.memory_bytes == 0 && bound < bounded.memory_bytes;
     if (by_size) bounded.memory_bytes = bound;
     bounded.most_bytes = bounded.memory_bytes > std::numeric_limits<std::size_t>::max() / paths.size()

@@ -24,6 +24,8 @@
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
+#include <tbb/parallel_for.h>
+#include <tbb/tbb_allocator.h>
 #include <unistd.h>
 
 #include "core/descriptor.h"
@@ -110,6 +112,64 @@ TEST(Sandbox, EndsWhatRunsTooLong) {
     EXPECT_EQ(error_of(asleep, limits), "subject.vdb: cannot read: it takes longer than allowed");
     const auto elapsed = std::chrono::steady_clock::now() - start;
     EXPECT_LT(std::chrono::duration<double>(elapsed).count(), 5.0);
+}
+
+// A child that spins for a lock that nobody holds: once it has been silent for as long as it may, the next one is asked.
+TEST(Sandbox, StartsAnewWhereNothingComes) {
+    SandboxLimits limits;
+    limits.seconds = 60;
+    limits.quiet_seconds = 0.3;
+    int readings = 0, value = 0;
+    run_sandboxed(
+        "s", "a parser", limits, {},
+        [&](SandboxWriter& writer) {
+            volatile bool forever = readings < 2;
+            while (forever) {
+            }
+            writer.value(7);
+        },
+        [&](SandboxReader& reader) {
+            ++readings;
+            value = reader.value<int>();
+        });
+    EXPECT_EQ(readings, 3);
+    EXPECT_EQ(value, 7);
+
+    // Not where something has come: whoever was told of it would be told twice.
+    int told = 0;
+    const auto silent = [](SandboxWriter& writer) {
+        writer.value(1);
+        writer.flush();
+        for (;;) ::pause();
+    };
+    std::string message;
+    try {
+        run_sandboxed("s", "a parser", limits, {}, silent, [&](SandboxReader& reader) {
+            told += reader.value<int>();
+            reader.value<int>();
+        });
+    } catch (const Error& error) {
+        message = error.what();
+    }
+    EXPECT_EQ(message, "s: cannot read: it takes longer than allowed");
+    EXPECT_EQ(told, 1);
+}
+
+// What faults.ForkedReaders preloads ends this process where a child calls oneTBB.
+TEST(Sandbox, ForkedReadersThatCallOneTbbAreNoticed) {
+    if (std::getenv("FORKED_CALLS") == nullptr) GTEST_SKIP() << "nothing is preloaded";
+    const auto parallel = [](SandboxWriter& writer) {
+        std::vector<int> numbers(1000);
+        tbb::parallel_for(0, 1000, [&](int n) { numbers[std::size_t(n)] = n; });
+        writer.value(numbers[999]);
+    };
+    const auto allocating = [](SandboxWriter& writer) {
+        const std::vector<int, tbb::tbb_allocator<int>> numbers(1000, 4);
+        writer.value(numbers[999]);
+    };
+    EXPECT_DEATH(error_of(parallel), "called oneTBB");
+    EXPECT_DEATH(error_of(allocating), "called oneTBB");
+    EXPECT_EQ(error_of([](SandboxWriter& writer) { writer.value(1); }), "");
 }
 
 // A child that has told its result, or why there is none, need not end by itself.
