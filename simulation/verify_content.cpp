@@ -38,7 +38,8 @@ double largest_density(const Scene& scene) {
 // Judges the density of each file as a reader sees it.
 class Decoder {
   public:
-    explicit Decoder(const RunListing& run) : run_(run), most_of_scene_(largest_density(run.scene)) {}
+    explicit Decoder(const RunListing& run)
+        : run_(run), whole_{run.folder, run.scene.name}, most_of_scene_(largest_density(run.scene)) {}
 
     void unreadable(const Error& error) { voxels_.add(error.what()); }
 
@@ -73,7 +74,8 @@ class Decoder {
         if (m.extinction_per_m != run_.scene.density.extinction_per_m)
             metadata_.add(fmt::format("{}: extinction {} per m", file.path, m.extinction_per_m));
         if (m.scene_hash != run_.frames_hash) metadata_.add(file.path + ": is of another scene");
-        if (run_.scene.layers.empty() && m.state_hash != frame.state_hash)
+        // A layer's file has the state of that layer, which the manifest does not list.
+        if (run_.folder / file.path == whole_.density(frame.number) && m.state_hash != frame.state_hash)
             metadata_.add(file.path + ": is of another state");
         if (!(m.georeference == run_.scene.georeference))
             metadata_.add(file.path + ": lies at another place");
@@ -99,6 +101,7 @@ class Decoder {
     }
 
     const RunListing& run_;
+    const RunFolder whole_;
     double most_of_scene_;
     Problems voxels_, values_, geometry_, metadata_;
     std::map<std::string, VdbGridInfo> first_;

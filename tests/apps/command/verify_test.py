@@ -272,6 +272,11 @@ class Verify(Case):
         scene = self.write("layered.toml", LAYERED)
         self.call("run", scene, "--no-render", "--out", "out")
         self.assertIn("layers", self.checks("out"))
+        shutil.copytree(self.folder / "out", self.folder / "lie")
+        manifest = json.loads((self.folder / "lie/manifest.json").read_text())
+        manifest["frames"][1]["state_hash"] = "0" * 32
+        (self.folder / "lie/manifest.json").write_text(unsealed(manifest))
+        self.assertEqual(["metadata"], self.failed("lie"))
         grids = json.loads(self.call("info", "out/density/layered_0001.vdb", "--json").stdout)["grids"]
         self.assertEqual([grid["name"] for grid in grids], ["density", "velocity"])
         for switch, left in (("per_layer", ["layered_0001.vdb"]), ("combined", ["high/layered_0001.vdb", "low/layered_0001.vdb"])):
