@@ -118,7 +118,6 @@ bool is_asked_first(const Editor& editor, const fs::path& path) {
 }
 
 void file_dialog(Editor& editor) {
-    if (editor.dialog == FileDialog::none) return;
     const char* title = title_of(editor.dialog);
     if (!ImGui::IsPopupOpen(title)) ImGui::OpenPopup(title);
     const float em = ImGui::GetFontSize();
@@ -346,10 +345,18 @@ void do_pending(Editor& editor) {
 }
 
 void dialogs(Editor& editor) {
-    file_dialog(editor);
-    unsaved_dialog(editor);
-    question_dialog(editor);
-    recovery_dialog(editor);
+    // One at a time, what was asked last first: popups that open beside each other close each other. The window's own cross may ask
+    // while another one is open.
+    if (editor.question)
+        question_dialog(editor);
+    else if (editor.dialog != FileDialog::none)
+        file_dialog(editor);
+    else if (!editor.left_autosaves.empty())
+        recovery_dialog(editor);
+    else if (editor.pending != Pending::none && editor.document->is_modified())
+        unsaved_dialog(editor);
+    else if (editor.pending != Pending::none)
+        do_pending(editor);
     run_window(editor);
     generation_window(editor);
     shortcuts_window(editor);

@@ -198,20 +198,6 @@ void shortcuts(Editor& editor) {
     }
 }
 
-// Throws Error(usage) where a picture would replace the scene, or a file that it names; while the text has problems and nobody was
-// asked, anything.
-void refuse_own_files(const Editor& editor, const std::filesystem::path& picture, bool was_asked) {
-    const SceneDocument& document = *editor.document;
-    if (document.has_file()) refuse_to_replace(document.path(), picture);
-    if (const Scene* const scene = document.current_scene())
-        refuse_to_replace_files_of(*scene, picture);
-    else if (!was_asked && is_there(picture))
-        throw Error(ErrorCode::usage,
-                    picture.string() +
-                        ": is there already, and may be a file of the scene, whose text has "
-                        "problems: expected the name of another one to write");
-}
-
 void save_capture(Editor& editor) {
     if (editor.capture_to.empty()) return;
     const WindowImage& image = editor.window->captured();
@@ -373,6 +359,19 @@ std::string kept_edits(Editor& editor) {
 }
 
 }  // namespace
+
+void refuse_own_files(const Editor& editor, const std::filesystem::path& file, bool was_asked) {
+    const SceneDocument& document = *editor.document;
+    if (document.has_file()) refuse_to_replace(document.path(), file);
+    if (const Scene* const scene = document.current_scene())
+        refuse_to_replace_files_of(*scene, file);
+    else if (is_there(file) &&
+             (!was_asked || document.text().find(file.filename().string()) != std::string::npos))
+        throw Error(ErrorCode::usage,
+                    file.string() +
+                        ": is there already, and may be a file of the scene, whose text has "
+                        "problems: expected the name of another one to write");
+}
 
 Editor::Editor(const EditorOptions& from)
     : options(from), folder(settings_folder()), settings(read_settings(folder)) {

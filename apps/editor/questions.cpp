@@ -52,7 +52,6 @@ void take_edits(Editor& editor, const LeftAutosave& found) {
 }  // namespace
 
 void unsaved_dialog(Editor& editor) {
-    if (editor.pending == Pending::none || editor.dialog != FileDialog::none || editor.question) return;
     constexpr const char* kTitle = "Unsaved edits";
     if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
     if (!ImGui::BeginPopupModal(kTitle, nullptr,
@@ -90,7 +89,6 @@ void unsaved_dialog(Editor& editor) {
 
 // One file after the other; what the user decides is done to the file that was found, or said to be gone.
 void recovery_dialog(Editor& editor) {
-    if (editor.left_autosaves.empty()) return;
     constexpr const char* kTitle = "Edits of an earlier session";
     if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
     if (!ImGui::BeginPopupModal(kTitle, nullptr,
@@ -144,7 +142,6 @@ void recovery_dialog(Editor& editor) {
 }
 
 void question_dialog(Editor& editor) {
-    if (!editor.question) return;
     constexpr const char* kTitle = "Are you sure?";
     if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
     if (!ImGui::BeginPopupModal(kTitle, nullptr,

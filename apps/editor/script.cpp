@@ -44,6 +44,7 @@ const std::map<std::string, int>& commands() {  // and how many words follow at 
                                                   {"minimise", 0},
                                                   {"restore", 0},
                                                   {"random", 2},
+                                                  {"close-window", 0},
                                                   {"quit", 0}};
     return known;
 }
@@ -313,12 +314,14 @@ void Script::begin_line(Editor& editor) {
         std::string name = rest_of(words, 1);
         const std::size_t percent = name.find('%');
         if (percent != std::string::npos) name.replace(percent, 1, std::to_string(editor.picture->step));
+        refuse_own_files(editor, name, false);
         save_rgba(name, editor.picture->width, editor.picture->height, editor.picture->rgba);
     } else if (command == "hashes") {
         std::string text;
         const std::vector<LiveStep> steps = editor.live->steps();
         for (std::size_t n = 0; n < steps.size(); ++n)
             text += std::to_string(n) + " " + steps[n].hash.hex() + "\n";
+        refuse_own_files(editor, rest_of(words, 1), false);
         write_atomically(rest_of(words, 1), text);
     } else if (command == "expect-control") {
         if (!find(editor, rest_of(words, 1), at)) return;
@@ -331,6 +334,8 @@ void Script::begin_line(Editor& editor) {
     } else if (command == "random") {
         random_left_ = std::uint64_t(number(1, 0, 1e9));
         random_.seed(unsigned(number(2, 0, 4294967295.0)));
+    } else if (command == "close-window") {
+        editor.window->ask_to_close(true);
     } else if (command == "quit") {
         editor.quit = true;
     }

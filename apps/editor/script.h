@@ -21,6 +21,7 @@
 //     resize X Y, minimise, restore
 //     drop FILE ...          files that are dropped on the window; a name with blanks stands in quotes
 //     random N SEED          N random clicks, drags and keys
+//     close-window           presses the cross of the window
 //     quit                   ends at once, whatever is unsaved
 //
 // A control that is not there within ten seconds ends the program with status 1 and says which there are.

@@ -86,11 +86,12 @@ class Window(Case):
         script.write_text("wait 0.1\n", encoding="utf-8")
         Image.new("L", (4, 4), 255).save(picture)
         scene.write_text(scene.read_text(encoding="utf-8").replace("[ground]\n", '[ground]\nheight_map = "mask.png"\n'), encoding="utf-8")
-        for path in (scene, script, picture, picture, picture):
+        named, unknown = "is the file that is read", "mask.png: is there already, and may be a file of the scene"
+        for path, says in ((scene, named), (script, named), (picture, named), (picture, unknown), (picture, unknown)):
             before = path.read_bytes()
             arguments = ["--script", script] if path == script else []
             said = self.edit(scene, "--screenshot", path, "--after", "0.2", *arguments, status=2)
-            self.assertRegex(said, "is the file that is read|is there already, and may be a file of the scene")
+            self.assertIn(says, said)
             self.assertEqual(path.read_bytes(), before)
             if path == picture:  # the second time the scene has a problem, the third it is no TOML
                 scene.write_text(scene.read_text(encoding="utf-8").replace("seed = ", "seed = -"), encoding="utf-8")

@@ -326,6 +326,90 @@ class Safety(Kept):
         self.assertIn("seed = 12", (self.folder / "copy.toml").read_text(encoding="utf-8"))
         self.assertFalse((self.folder / ".models-2.toml.autosave").exists())
 
+    def test_the_cross_while_something_is_asked(self):
+        """One question after the other, none of which hides the next."""
+        scene = self.models()
+        for number, seed in (("", 12), (".77", 13)):
+            (self.folder / f".models.toml{number}.autosave").write_text(MODELS.replace("seed = 4", f"seed = {seed}"), encoding="utf-8")
+        taken = self.folder / "taken.toml"
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            click "Take them"
+            wait 0.5
+            close-window
+            wait 0.5
+            click "Ask again next time"
+            wait 0.5
+            expect-control "unsaved models.toml"
+            click "Go on editing"
+            wait 0.5
+            key F12
+            wait 0.5
+            close-window
+            wait 0.5
+            click Cancel
+            wait 0.5
+            expect-control "unsaved models.toml"
+            click "Go on editing"
+            wait 0.5
+            key CTRL+SHIFT+S
+            set "file name" taken.toml
+            wait 0.5
+            close-window
+            wait 20
+            """)
+        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
+        self.assertRegex(taken.read_text(encoding="utf-8"), "seed = 1[23]")
+        self.assertEqual(len(list(self.folder.glob(".models.toml*autosave"))), 1)  # asked again next time
+
+    def test_the_cross_while_a_run_is_under_way(self):
+        """Also while a file is chosen, whose dialog comes back."""
+        scene = self.models()
+        self.edit(scene, "--validation", script="""
+            wait-step 1
+            key CTRL+R
+            wait 0.5
+            click "Start the run"
+            wait 0.5
+            key F12
+            wait 0.5
+            close-window
+            wait 0.5
+            click "Go back"
+            wait 0.5
+            set "file name" window.png
+            wait 0.5
+            close-window
+            wait 0.5
+            click "Stop it and quit"
+            wait 20
+            """)
+        self.assertTrue((self.folder / "window.png").is_file())
+        self.assertTrue(list((self.folder / "out").iterdir()))
+
+    def test_the_cross_before_edits_of_a_scene_that_is_gone(self):
+        (self.folder / ".gone.toml.autosave").write_text(MODELS.replace("seed = 4", "seed = 12"), encoding="utf-8")
+        for answer in ("Ask again next time", "Take them"):
+            self.edit(self.folder / "gone.toml", "--validation", script=f"""
+                wait 2
+                close-window
+                wait 0.5
+                click "{answer}"
+                wait 0.5
+                """ + ("" if answer.startswith("Ask") else """
+                expect-control "unsaved gone.toml"
+                click "Save them"
+                """) + "wait 20\n")
+            self.assertEqual((self.folder / "gone.toml").exists(), answer == "Take them")
+        self.assertIn("seed = 12", (self.folder / "gone.toml").read_text(encoding="utf-8"))
+
+    def test_scripts_replace_no_file_of_the_scene(self):
+        scene = self.models()
+        for command in ("picture", "hashes", "screenshot"):
+            said = self.edit(scene, script=f"wait-step 1\nwait-picture\n{command} {scene}\nwait 1\n", status=2)
+            self.assertIn("is the file that is read", said)
+            self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
+
     def test_a_picture_that_cannot_be_saved(self):
         """A picture of the window into a folder that cannot be made: said, and the program goes on."""
         scene = self.models()
