@@ -21,6 +21,10 @@ class FolderLock {
     // Returns false on a file system that has no locks (some network ones): two of them are then not kept apart.
     bool held() const { return held_; }
 
+    const std::filesystem::path& path() const { return path_; }
+    // Returns the descriptor of the folder, which this keeps open.
+    int descriptor() const { return folder_.get(); }
+
     // Returns true while the folder's path leads to the folder that is held. Who removes or renames it takes the lock
     // along, and another one may begin in a new one of that name.
     bool in_place() const;

@@ -411,9 +411,10 @@ std::string clamp_text(std::string_view text, std::size_t length) {
 void run_sandboxed(const std::filesystem::path& subject, std::string_view parser, const SandboxLimits& limits,
                    std::span<const int> kept, const std::function<void(SandboxWriter&)>& child,
                    const std::function<void(SandboxReader&)>& parent) {
-    if (!(limits.seconds > 0 && limits.seconds <= 1e6)) {
-        throw Error(ErrorCode::usage,
-                    "time limit of " + number_text(limits.seconds, 6) + " s: must be above 0");
+    for (const double seconds : {limits.seconds, limits.quiet_seconds}) {
+        if (!(seconds > 0 && seconds <= 1e6))
+            throw Error(ErrorCode::usage, "time limit of " + number_text(seconds, 6) +
+                                              " s: must be above 0, at most 1,000,000");
     }
     TimeAllowed time(limits.seconds);
     for (int n = 1; n <= kMaxAttempts; ++n) {

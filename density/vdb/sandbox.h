@@ -9,8 +9,8 @@
 // fork() without exec() in a program with threads: the child has only the calling thread, and a lock that
 // another thread held at that moment stays locked in it. glibc makes its own allocator safe; other locks
 // (OpenVDB's type registries) may deadlock, and those of oneTBB spin (density/vdb/serial_tree.h). A child that has sent nothing
-// at all is therefore killed and restarted, twice at most, once it has used no processor time for a while, or once it
-// may not be silent any longer; after that only the limits end it.
+// at all is therefore killed and restarted, twice at most, once it has used no processor time for a while, or, where the limit
+// of all its time leaves that, once it may not be silent any longer; after that only the limits end it.
 
 #include <cstddef>
 #include <cstdint>
@@ -28,8 +28,8 @@ namespace nephos {
 
 // Limits of the child.
 struct SandboxLimits {
-    double seconds = 60;  // of wall-clock time, above 0
-    double quiet_seconds = 1e6;                         // that it may send nothing, above 0
+    double seconds = 60;         // of wall-clock time, of all attempts together: above 0, at most 1e6
+    double quiet_seconds = 1e6;  // that it may send nothing: likewise
     std::size_t memory_bytes = std::size_t{256} << 20;  // more than this process has
     std::size_t most_bytes = std::size_t{64} << 20;     // that it may send
 };

@@ -94,7 +94,7 @@ void in_sandbox(std::span<const std::filesystem::path> paths, const VdbReadLimit
     }
     const double count = double(paths.size());
     SandboxLimits bounded{.seconds = std::min(1e6, limits.seconds * count),
-                          .quiet_seconds = limits.seconds,  // each file sends something
+                          .quiet_seconds = std::min(1e6, limits.seconds),  // each file sends something
                           .memory_bytes = memory_limit(limits),
                           .most_bytes = 0};
     const bool by_size = limits.memory_bytes == 0 && bound < bounded.memory_bytes;

@@ -352,7 +352,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     }
     refuse_own_folder(options, sequences);
     const FolderLock lock(options.folder, "export");
-    ExportList list(options, sequences);
+    ExportList list(lock, options, sequences);
     list.require_free(file_names(options, sequences));
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());

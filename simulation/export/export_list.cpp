@@ -141,8 +141,9 @@ bool is_export_folder(const std::filesystem::path& folder) {
     return type_behind(folder / "export.json") == std::filesystem::file_type::regular;
 }
 
-ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences)
-    : folder_(options.folder), work_(options.folder) {
+ExportList::ExportList(const FolderLock& lock, const ExportOptions& options,
+                       const std::vector<ExportSequence>& sequences)
+    : folder_(options.folder), work_(lock) {
     head_ = head_json(options, sequences).dump(2, ' ', false, Json::error_handler_t::replace);
     claim(folder_);
     if (!is_export_folder(folder_)) return;
@@ -158,7 +159,8 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     if (json.dump(2, ' ', false, Json::error_handler_t::replace) != head_)
         throw Error(ErrorCode::usage,
                     folder_.string() +
-                        ": holds an export with other options or of another scene: choose another folder");
+                        ": holds an export with other options, of another scene or other layers, or, under "
+                        "--range auto, with another largest value: choose another folder");
     for (ExportedFile& file : files) {
         std::string name = file.path.generic_string();
         if (stands_there(folder_ / name)) earlier_.emplace(std::move(name), std::move(file));
@@ -175,7 +177,7 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
 void ExportList::require_free(const std::vector<std::string>& names) const {
     for (const std::string& name : names)
         if (!earlier_.contains(name) && stands_there(folder_ / name))
-            throw_place_taken(folder_ / name, was_interrupted_ && !noted_.contains(name));
+            throw_place_taken(folder_ / name, was_interrupted_ && noted_.empty());
 }
 
 void ExportList::begin() {
@@ -211,12 +213,13 @@ ExportedFile ExportList::write_file(const std::string& name, const ExportSource&
     ExportedFile file{name, work_.digest_of(name), below_folder(source.path), std::string(format),
                       source.digest};
     work_.note(file);
+    std::map<std::string, ExportedFile> made{{name, file}};  // before: what has its place must be listed
     if (earlier_.contains(name) && stands_there(folder_ / name))
         work_.replace(name);
     else
         work_.place(name);
     const std::scoped_lock lock(mutex_);
-    made_[name] = file;
+    made_.merge(made);
     return file;
 }
 

@@ -29,10 +29,11 @@ struct ExportSource {
 
 class ExportList {
   public:
-    // Takes over the list of an earlier export with the same options into the folder, which must be there, and removes the
-    // temporary files of one that was killed: for the holder of the folder's lock alone. Throws Error(usage) when the folder
+    // Takes over the list of an earlier export with the same options into the folder that is locked, and removes the
+    // temporary files of one that was killed. `lock` must outlive this. Throws Error(usage) when the folder
     // holds an export with other options, or a file without a list, or as ExportWork(); Error(io) when the list is damaged.
-    ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
+    ExportList(const FolderLock& lock, const ExportOptions& options,
+               const std::vector<ExportSequence>& sequences);
 
     // Throws Error(usage) naming the first of these files that is there and that no export has written.
     void require_free(const std::vector<std::string>& names) const;
@@ -44,8 +45,9 @@ class ExportList {
     std::optional<ExportedFile> kept_file(const std::string& name, const ExportSource& source) const;
     // Returns what is to be told of a file that is not as it was listed, and is about to be made again; empty: nothing. Thread-safe.
     std::string note_on_change(const std::string& name) const;
-    // Calls `write` with the path that it is to write, and returns the entry of the file, with its checksum. It is noted before it gets
-    // its place (ExportWork), in which nothing may stand but a file that is listed. Thread-safe for different files. Throws Error(usage) naming what stands there, Error(io); exceptions of `write` pass through.
+    // Calls `write` with the path that it is to write, and returns the entry of the file, with its checksum. It is noted
+    // before it gets its place (ExportWork), in which nothing may stand but a file that is listed. Thread-safe for different
+    // files. Throws Error(usage) naming what stands there, Error(io); exceptions of `write` pass through.
     ExportedFile write_file(const std::string& name, const ExportSource& source, std::string_view format,
                             const std::function<void(const std::filesystem::path& path)>& write);
     // List a file; those of frames in their order.

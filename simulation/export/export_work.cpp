@@ -49,14 +49,21 @@ bool is_of_export(const std::filesystem::path& work) {
 }
 
 // Renames a file where nothing stands. Returns 0 or errno.
-int rename_to_free_place(int from_folder, const char* name, int to_folder) {
-    if (::renameat2(from_folder, name, to_folder, name, RENAME_NOREPLACE) == 0) return 0;
+int rename_to_free_place(int from_folder, const std::string& from, int to_folder, const std::string& to) {
+    if (::renameat2(from_folder, from.c_str(), to_folder, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
     if (errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP) return errno;
     // A file system that cannot, as some network ones.
     struct stat status {};
-    if (::fstatat(to_folder, name, &status, AT_SYMLINK_NOFOLLOW) == 0) return EEXIST;
+    if (::fstatat(to_folder, to.c_str(), &status, AT_SYMLINK_NOFOLLOW) == 0) return EEXIST;
     if (errno != ENOENT) return errno;
-    return ::renameat(from_folder, name, to_folder, name) == 0 ? 0 : errno;
+    return ::renameat(from_folder, from.c_str(), to_folder, to.c_str()) == 0 ? 0 : errno;
+}
+
+// Returns the text of an error, in which files of the one folder are called by their path in the other.
+std::string renamed(std::string text, const std::string& from, const std::string& to) {
+    for (std::size_t at = text.find(from); at != text.npos; at = text.find(from, at + to.size()))
+        text.replace(at, from.size(), to);
+    return text;
 }
 
 }  // namespace
@@ -90,15 +97,22 @@ std::vector<ExportedFile> noted_files(const std::filesystem::path& folder) {
     return files;
 }
 
-ExportWork::ExportWork(std::filesystem::path folder) : folder_(std::move(folder)) {
-    const std::filesystem::path work = folder_ / kExportWork;
+ExportWork::ExportWork(const FolderLock& lock)
+    : lock_(lock), folder_(lock.path()), path_(folder_ / kExportWork) {
     struct stat status {};
-    if (::lstat(work.c_str(), &status) != 0) {
-        if (errno != ENOENT) fail(work, "cannot be examined", errno);
+    if (::fstatat(lock_.descriptor(), kExportWork, &status, AT_SYMLINK_NOFOLLOW) != 0) {
+        if (errno != ENOENT) fail(path_, "cannot be examined", errno);
         return;
     }
-    if (!S_ISDIR(status.st_mode) || !is_trusted_owner(status.st_uid) || !is_of_export(work))
-        throw_in_the_way(work);
+    if (!S_ISDIR(status.st_mode) || !is_trusted_owner(status.st_uid)) throw_in_the_way(path_);
+    open();
+    if (::fstat(work_.get(), &status) != 0) fail(path_, "cannot be examined", errno);
+    if (!is_trusted_owner(status.st_uid) || !is_of_export(held_path_of({}))) throw_in_the_way(path_);
+}
+
+void ExportWork::open() {
+    work_.reset(::openat(lock_.descriptor(), kExportWork, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+    if (work_.get() < 0) fail(path_, "cannot open", errno);
 }
 
 // Trusts who has written the list with notes, too: for root, and where a file system has one owner for all.
@@ -109,61 +123,47 @@ bool ExportWork::is_trusted_owner(unsigned user) const {
 }
 
 void ExportWork::begin() {
-    const std::filesystem::path work = folder_ / kExportWork;
-    place_.reset(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (place_.get() < 0) fail(folder_, "cannot open", errno);
-    work_.reset(::openat(place_.get(), kExportWork, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
     if (work_.get() >= 0) {
-        struct stat status {};
-        if (::fstat(work_.get(), &status) != 0) fail(work, "cannot be examined", errno);
-        if (!is_trusted_owner(status.st_uid)) throw_in_the_way(work);  // put there since
+        if (!is_same_file(work_.get(), path_)) throw_in_the_way(path_);
         clear();
-    } else if (errno != ENOENT) {
-        fail(work, "cannot open", errno);
     }
-    if (::mkdirat(place_.get(), kExportWork, 0700) != 0) fail(work, "cannot create", errno);
+    if (::mkdirat(lock_.descriptor(), kExportWork, 0700) != 0) {
+        if (errno == EEXIST) throw_in_the_way(path_);
+        fail(path_, "cannot create", errno);
+    }
     try {
         open();
+        notes_.reset(::openat(work_.get(), kNotes,
+                              O_WRONLY | O_APPEND | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
+        if (notes_.get() < 0) fail(path_ / kNotes, "cannot create", errno);
+        if (const int failed = flush_to_device(work_.get()); failed != 0 && failed != EINVAL)
+            fail(path_, "cannot flush to the device", failed);
+        flush();
     } catch (const Error&) {
-        ::unlinkat(work_.get(), kNotes, 0);
-        ::unlinkat(place_.get(), kExportWork, AT_REMOVEDIR);
+        if (notes_.get() >= 0) ::unlinkat(work_.get(), kNotes, 0);
+        notes_.reset(-1);
         work_.reset(-1);
+        ::unlinkat(lock_.descriptor(), kExportWork, AT_REMOVEDIR);  // if it is empty
         throw;
     }
 }
 
-void ExportWork::open() {
-    const std::filesystem::path work = folder_ / kExportWork;
-    work_.reset(::openat(place_.get(), kExportWork, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
-    if (work_.get() < 0) fail(work, "cannot open", errno);
-    notes_.reset(
-        ::openat(work_.get(), kNotes, O_WRONLY | O_APPEND | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
-    if (notes_.get() < 0) fail(work / kNotes, "cannot create", errno);
-    if (const int failed = flush_to_device(work_.get()); failed != 0 && failed != EINVAL)
-        fail(work, "cannot flush to the device", failed);
-    flush();
-}
-
 // Removes the folder that is held, and what is in it: the notes last, by which it is known.
 void ExportWork::clear() {
-    const std::filesystem::path work = folder_ / kExportWork;
     const auto remove = [&](const char* name) {
         if (::unlinkat(work_.get(), name, 0) != 0 && errno != ENOENT)
-            fail(work / name, "cannot remove", errno);
+            fail(path_ / name, "cannot remove", errno);
     };
     for (const std::string& name : names_in_folder(held_path_of({})))
         if (name != kNotes) remove(name.c_str());
     remove(kNotes);
-    if (::unlinkat(place_.get(), kExportWork, AT_REMOVEDIR) != 0 && errno != ENOENT)
-        fail(work, "cannot remove", errno);
+    if (::unlinkat(lock_.descriptor(), kExportWork, AT_REMOVEDIR) != 0) fail(path_, "cannot remove", errno);
     work_.reset(-1);
 }
 
-// Returns the path by the folder's descriptor where the system has such paths.
+// Returns the path by the folder's descriptor, which leads there wherever the folder is.
 std::filesystem::path ExportWork::held_path_of(const std::string& name) const {
-    const std::filesystem::path held = "/proc/self/fd/" + std::to_string(work_.get());
-    std::error_code error;
-    return std::filesystem::is_directory(held, error) ? held / name : path_of(name);
+    return std::filesystem::path("/proc/self/fd") / std::to_string(work_.get()) / name;
 }
 
 void ExportWork::write(const std::string& name,
@@ -172,62 +172,77 @@ void ExportWork::write(const std::string& name,
     try {
         write(held);
     } catch (const Error& error) {
-        std::string text = error.what();
-        const std::string folder = held.parent_path().string();
-        const std::size_t at = text.find(folder);
-        if (at == text.npos) throw;
-        throw Error(error.code(), text.replace(at, folder.size(), (folder_ / kExportWork).string()));
+        throw Error(error.code(), renamed(error.what(), held.parent_path().string(), path_.string()));
     }
 }
 
-FileDigest ExportWork::digest_of(const std::string& name) const { return file_digest(held_path_of(name)); }
+FileDigest ExportWork::digest_of(const std::string& name) const {
+    FileDigest digest;
+    write(name, [&](const std::filesystem::path& held) { digest = file_digest(held); });
+    return digest;
+}
 
 void ExportWork::note(const ExportedFile& file) {
     // Behind one that a full disk has torn it is a line of its own, too.
     const std::string note =
         "\n" + export_entry(file).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     const std::scoped_lock lock(mutex_);
-    const std::filesystem::path notes = path_of(kNotes);
     if (const int error = write_all(notes_.get(), std::as_bytes(std::span(note))))
-        fail(notes, "cannot write", error);
+        fail(path_ / kNotes, "cannot write", error);
     if (const int error = flush_to_device(notes_.get()); error != 0 && error != EINVAL)
-        fail(notes, "cannot flush to the device", error);
+        fail(path_ / kNotes, "cannot flush to the device", error);
 }
 
 void ExportWork::place(const std::string& name) {
-    const int error = rename_to_free_place(work_.get(), name.c_str(), place_.get());
-    if (error == 0) return;
-    // Some unions of file systems rename within a folder alone.
-    if (error == EXDEV && !stands_there(folder_ / name)) return replace(name);
-    ::unlinkat(work_.get(), name.c_str(), 0);
-    if (error == EEXIST || error == EXDEV) throw_place_taken(folder_ / name);
+    const int error = rename_to_free_place(work_.get(), name, lock_.descriptor(), name);
+    if (error == EXDEV) copy_to_free_place(name);  // some unions of file systems rename within a folder alone
+    if (error != 0) ::unlinkat(work_.get(), name.c_str(), 0);
+    if (error == 0 || error == EXDEV) return;
+    if (error == EEXIST) throw_place_taken(folder_ / name);
     fail(folder_ / name, "cannot rename into place", error);
 }
 
+void ExportWork::copy_to_free_place(const std::string& name) const {
+    const std::filesystem::path place = folder_ / name;
+    const AtomicFile copy(place);  // removes its file where that gets no place
+    std::error_code failed;
+    std::filesystem::copy_file(held_path_of(name), copy.temporary(),
+                               std::filesystem::copy_options::overwrite_existing, failed);
+    if (failed) fail(place, "cannot write", failed.value());
+    const Descriptor written = open_regular_file(copy.temporary(), O_RDONLY);
+    if (const int unflushed = flush_to_device(written.get()); unflushed != 0 && unflushed != EINVAL)
+        fail(place, "cannot flush to the device", unflushed);
+    require_in_place();
+    const int error = rename_to_free_place(lock_.descriptor(), copy.temporary().filename().string(),
+                                           lock_.descriptor(), name);
+    if (error == EEXIST) throw_place_taken(place);
+    if (error != 0) fail(place, "cannot rename into place", error);
+}
+
 void ExportWork::require_in_place() const {
-    if (is_same_file(place_.get(), folder_) && is_same_file(work_.get(), folder_ / kExportWork)) return;
-    throw Error(
-        ErrorCode::io,
-        folder_.string() + ": the folder was removed or renamed while the export was writing into it");
+    lock_.require_in_place();
+    if (!is_same_file(work_.get(), path_))
+        throw Error(ErrorCode::io,
+                    path_.string() + ": was removed or renamed while the export was writing into it");
 }
 
 void ExportWork::replace(const std::string& name) {
     const std::function<void()> check = [this] { require_in_place(); };
     const PublishCheck keeps_in_place(check);
-    copy_atomically(held_path_of(name), folder_ / name);
+    write(name, [&](const std::filesystem::path& held) { copy_atomically(held, folder_ / name); });
     ::unlinkat(work_.get(), name.c_str(), 0);
 }
 
 void ExportWork::flush() const {
-    if (place_.get() < 0) return;
-    const int error = flush_to_device(place_.get());
+    const int error = flush_to_device(lock_.descriptor());
     if (error != 0 && error != EINVAL) fail(folder_, "cannot flush to the device", error);
 }
 
 void ExportWork::end() {
+    if (notes_.get() < 0) return;
+    require_in_place();
     notes_.reset(-1);
-    if (work_.get() >= 0) clear();
-    place_.reset(-1);
+    clear();
 }
 
 void throw_place_taken(const std::filesystem::path& path, bool may_be_own) {

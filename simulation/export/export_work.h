@@ -14,6 +14,7 @@
 
 #include "core/descriptor.h"
 #include "simulation/export/export.h"
+#include "simulation/folder_lock.h"
 
 namespace nephos {
 
@@ -30,23 +31,25 @@ std::vector<ExportedFile> noted_files(const std::filesystem::path& folder);
 // For the holder of the folder's lock alone.
 class ExportWork {
   public:
-    // Throws Error(usage) when something is in the place of the hidden folder that no export has made, of this user or of who has
-    // written the list; Error(io).
-    explicit ExportWork(std::filesystem::path folder);
+    // Holds the hidden folder that a killed export has left. Throws Error(usage) when something is in its place that no export has
+    // made, of this user or of who has written the list; Error(io). `lock` must outlive this.
+    explicit ExportWork(const FolderLock& lock);
 
-    // Makes the hidden folder, without what a killed export left in it, which must be listed by now. Throws Error(io).
+    // Makes the hidden folder, without what a killed export left in it, which must be listed by now. Throws Error(usage) when something
+    // was put in its place since; Error(io).
     void begin();
     // Throws Error(io) when the folder or the hidden one is not in its place any more: another might be.
     void require_in_place() const;
     // Calls `write` with a path in the hidden folder, which leads there also when that is moved or another is put in its place.
-    // Exceptions of `write` pass through, with the folder's name.
+    // Exceptions of `write` pass through; those that name a file there name it by its path in the folder.
     void write(const std::string& name,
                const std::function<void(const std::filesystem::path& path)>& write) const;
     // Returns the checksum of a file that was written there. Throws Error(io).
     FileDigest digest_of(const std::string& name) const;
     // Notes a file that was written there, and flushes the note to the device. Thread-safe. Throws Error(io).
     void note(const ExportedFile& file);
-    // Gives a noted file its place. Thread-safe. Throws Error(io); Error(usage) naming what stands there.
+    // Gives a noted file its place. Thread-safe. Throws Error(io); Error(usage) naming what stands there. After an exception the
+    // file has no place.
     void place(const std::string& name);
     // The same where a file is listed: its content is replaced, its owner and permissions stay, and links lead to it. Throws Error(io).
     void replace(const std::string& name);
@@ -57,14 +60,15 @@ class ExportWork {
 
   private:
     void open();
-    std::filesystem::path path_of(const std::string& name) const { return folder_ / kExportWork / name; }
-    std::filesystem::path held_path_of(const std::string& name) const;
-    bool is_trusted_owner(unsigned user) const;
     void clear();
+    void copy_to_free_place(const std::string& name) const;
+    bool is_trusted_owner(unsigned user) const;
+    std::filesystem::path held_path_of(const std::string& name) const;
 
-    std::filesystem::path folder_;
-    Descriptor place_, work_, notes_;  // the folder, the hidden one, and the file of notes in it
-    std::mutex mutex_;                 // of notes_
+    const FolderLock& lock_;
+    const std::filesystem::path folder_, path_;  // of the export; the hidden one in it
+    Descriptor work_, notes_;                    // the hidden one, and, once begun, the file of notes in it
+    std::mutex mutex_;                           // of notes_
 };
 
 // Throws Error(usage): a file that is in no list stands at a place. `may_be_own`: the last export was interrupted, and the notes say

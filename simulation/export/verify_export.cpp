@@ -239,9 +239,13 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
         files.push_back({file.path, file.digest.bytes, file.digest.xxh3});
         names.insert(file.path);
     }
+    if (!list.complete) {
+        names.insert(kExportWork);
+        for (const ExportedFile& file : noted_files(folder)) names.insert(file.path);
+    }
     std::vector<std::filesystem::path> extra;
     for (const std::string& name : names_in_folder(folder))
-        if (!names.contains(name) && (list.complete || name != kExportWork)) extra.emplace_back(name);
+        if (!names.contains(name)) extra.emplace_back(name);
     for (Check& check : check_files(folder, files, extra)) result.checks.push_back(std::move(check));
     if (!options.hashes_only) {
         for (Check& check : check_sidecars(folder, list)) result.checks.push_back(std::move(check));

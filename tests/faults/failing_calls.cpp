@@ -5,7 +5,7 @@
 //                                       from FIRST on. NAME: open, read, write (with pwrite, writev), lseek, fsync (with
 //                                       fdatasync), rename (with renameat, renameat2), mkdir, stat (with lstat, fstat, fstatat), mmap, or
 //                                       allocate (memory of 32 KiB or more). HOW: an error (EIO, EINTR, ENOSPC, EACCES,
-//                                       EMFILE, ENOMEM), KILL, STOP (until SIGCONT; the call does not fail), SHORT (of read
+//                                       EMFILE, ENOMEM, EXDEV, EINVAL), KILL, STOP (until SIGCONT; the call does not fail), SHORT (of read
 //                                       and write: half of the bytes), or COUNT (a byte into the file FAIL_COUNT for each)
 //     FAIL_PATH=TEXT                    only on files in whose path TEXT occurs
 //     FAIL_PROGRAM=NAME                 only in this program
@@ -42,9 +42,9 @@ struct Plan {
 };
 
 int error_of(std::string_view how) {
-    constexpr std::pair<std::string_view, int> kErrors[] = {{"EIO", EIO},       {"EINTR", EINTR},
-                                                            {"ENOSPC", ENOSPC}, {"EACCES", EACCES},
-                                                            {"EMFILE", EMFILE}, {"ENOMEM", ENOMEM}};
+    constexpr std::pair<std::string_view, int> kErrors[] = {
+        {"EIO", EIO},       {"EINTR", EINTR},   {"ENOSPC", ENOSPC}, {"EACCES", EACCES},
+        {"EMFILE", EMFILE}, {"ENOMEM", ENOMEM}, {"EXDEV", EXDEV},   {"EINVAL", EINVAL}};
     for (const auto& [name, error] : kErrors)
         if (name == how) return error;
     return 0;

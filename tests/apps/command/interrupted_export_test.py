@@ -117,10 +117,64 @@ class InterruptedExport(Case):
         (self.folder / "out/.nephos-export").symlink_to("../victim")
         process.send_signal(signal.SIGCONT)
         error = process.communicate(timeout=60)[1]
-        self.assertEqual((process.returncode, (self.folder / "victim/letter.txt").read_text()), (3, "mine"), error)
+        self.assertEqual((process.returncode, (self.folder / "victim/letter.txt").read_text()), (2, "mine"), error)
         self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
         (self.folder / "out/.nephos-export").unlink()
         self.export("out", "--to", "raw")
+
+    def faulty(self, plan, path, *arguments, status, **more):
+        """An export of which calls of the system fail."""
+        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": plan, "FAIL_PATH": path, **more}
+        done = subprocess.run([NEPHOS, "export", "run", *arguments], cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, status, done.stderr)
+        return done.stderr
+
+    def test_file_systems_that_rename_less(self):
+        """Without RENAME_NOREPLACE (EINVAL), and within a folder alone (EXDEV)."""
+        whole = self.export("whole", "--to", "raw")
+        for number, plan in enumerate(("rename EINVAL 1 1", "rename EXDEV 1 1")):
+            out = f"less-{number}"
+            self.faulty(plan, f"{out}/placed_0002", "--to", "raw", "-o", out, status=0)
+            self.call("verify", out)
+            self.assertEqual({file.name: file.read_bytes() for file in (self.folder / out).iterdir()}, {file.name: file.read_bytes() for file in whole.iterdir()})
+        error = self.faulty("rename EXDEV 1 2", "none/placed_0002", "--to", "raw", "-o", "none", status=3)
+        self.assertIn("none/placed_0002.raw: cannot rename into place: Invalid cross-device link", error)
+        self.assertEqual([path.name for path in (self.folder / "none").glob(".*")], [])
+        self.assertFalse((self.folder / "none/placed_0002.raw").exists())
+        self.export("none", "--to", "raw")
+
+    def test_messages_name_the_hidden_folder_by_its_path(self):
+        for call in ("read EIO 1 1", "write ENOSPC 1 1", "open EACCES 1 1"):
+            error = self.faulty(call, ".nephos-export/placed_0002" if call.startswith("read") else ".nephos-export/.placed_0002", "--to", "raw", "-o", "out", status=3)
+            self.assertIn("out/.nephos-export/placed_0002.raw: cannot ", error)
+            self.export("out", "--to", "raw")
+            shutil.rmtree(self.folder / "out")
+
+    def test_a_folder_put_there_meanwhile_stays(self):
+        """Where an export has looked for its hidden folder, and not made it yet; whoever owns it."""
+        for was_killed in (False, True):
+            for owner in (0, 65534):
+                if was_killed:
+                    self.killed("rename", 2, "out/placed_", "--to", "raw", "-o", "out")
+                environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename STOP 1 1", "FAIL_PATH": "export.json"}
+                process = subprocess.Popen([NEPHOS, "export", "run", "--to", "raw", "-o", "out"], cwd=self.folder, env=environment,
+                                           stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+                os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+                hidden = self.folder / "out/.nephos-export"
+                if was_killed:
+                    hidden.rename(self.folder / "away")
+                hidden.mkdir()
+                (hidden / "thesis.txt").write_text("mine")
+                if os.geteuid() == 0:
+                    os.chown(hidden, owner, owner)
+                process.send_signal(signal.SIGCONT)
+                error = process.communicate(timeout=60)[1]
+                self.assertEqual((process.returncode, (hidden / "thesis.txt").read_text()), (2, "mine"), error)
+                self.assertIn(".nephos-export: is in the way", error)
+                hidden.rename(self.folder / "thesis")
+                self.export("out", "--to", "raw")
+                for name in ("out", "thesis", "away"):
+                    shutil.rmtree(self.folder / name, ignore_errors=True)
 
     def test_notes_of_others(self):
         """Damaged, very long or none at all, they let nothing in and take no memory."""
