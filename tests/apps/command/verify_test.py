@@ -2,6 +2,7 @@
 """Runs whose files are damaged, missing or strange, and what `nephos verify` says of them."""
 
 import json
+import os
 import shutil
 import subprocess
 import unittest
@@ -267,6 +268,17 @@ class Verify(Case):
         self.refused(3, "verify", ".", says="manifest.json")
         self.write("bad/manifest.json", "{}")
         self.refused(3, "verify", "bad", says="manifest.json")
+
+    def test_forked_readers_call_nothing_of_onetbb(self):
+        """Beside the threads of the command a lock of it may be held, for which they would wait for ever."""
+        scene = self.write("layered.toml", LAYERED)
+        library = os.environ["FAILING_CALLS"].replace("libfailing_calls.so", "libforked_calls.so")
+        self.environment["LD_PRELOAD"] = library
+        self.call("run", scene, "--no-render", "--out", "out")
+        self.call("verify", "out", "--replay", 2)
+        self.call("export", "out", "--to", "nvdb", "--to", "vdb", "--velocity", "wind", "-o", "volumes")
+        self.call("verify", "volumes")
+        self.call("info", "out/density/layered_0001.vdb")
 
     def test_layers_and_their_files(self):
         scene = self.write("layered.toml", LAYERED)
