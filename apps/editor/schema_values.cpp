@@ -248,7 +248,10 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
         const bool layer_skies = tables.name == "layer" && key.name == "skies";
         const bool sky_models = tables.name == "sky" && (key.name == "models" || key.name == "clouds");
         const bool base = tables.name == "layer" && key.name == "base_height_m";
-        if (!key.required && !layer_skies && !sky_models && !base) continue;
+        const bool rises =
+            key.kind == KeyKind::number && rises_from_item_to_item(tables, key) && array != nullptr;
+        const bool next = rises && !array->items.empty();  // it may not be the value of the item before
+        if (!key.required && !layer_skies && !sky_models && !base && !next) continue;
         std::string value;
         if (key.name == "name") {
             std::string start = element_name(tables.name);
@@ -275,7 +278,7 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
                 value += name + " = " + inner;
             }
             value += value.size() > 3 ? " }]" : "}]";
-        } else if (key.kind == KeyKind::number && rises_from_item_to_item(tables, key) && array != nullptr) {
+        } else if (rises) {
             double last = 0;
             for (const Node& item : array->items) last = std::max(last, number_in(item, key.name));
             value = number_text(array->items.empty() ? 0 : std::min(last + step_of(key), key.limits.max), 6);

@@ -210,11 +210,13 @@ class Safety(Kept):
         scene.write_text("[lattice]\ncells = [12, 10, 8]\n", encoding="utf-8")
         # Those of files, wind_field and field.grids, want their name.
         script = "wait 1\nclick field\nwait 0.5\n"
-        for table in ("wind", "wind[0].levels", "lightning", "model", "sky", "field.profile", "field.profile[0].levels", "field.ellipsoids",
-                      "field.scatters", "layer"):
+        for table in ("wind", "wind[0].levels", "wind", "wind", "lightning", "model", "sky", "field.profile", "field.profile[0].levels",
+                      "field.profile", "field.ellipsoids", "field.scatters", "layer"):
             script += f'click "new {table}"\nwait 0.7\n'
         self.edit(scene, script=script + "key CTRL+S\nwait 0.5\n")
-        self.assertIn("levels", tomllib.loads(scene.read_text(encoding="utf-8"))["field"]["profile"][0])
+        written = tomllib.loads(scene.read_text(encoding="utf-8"))
+        self.assertIn("levels", written["field"]["profile"][0])
+        self.assertEqual([wind.get("time_s", 0) for wind in written["wind"]], [0, 600, 1200])
         done = subprocess.run([NEPHOS, "validate", scene], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
 
