@@ -211,7 +211,9 @@ struct Window::Impl {
         info.ImageCount = std::max(2u, std::uint32_t(chain.views.size()));
         info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
         info.CheckVkResultFn = [](VkResult result) {
-            if (result < 0) vk::throwResultException(vk::Result(result), "ImGui");
+            if (result >= 0) return;
+            has_failed_in_imgui = true;
+            vk::throwResultException(vk::Result(result), "ImGui");
         };
         ImGui_ImplVulkan_Init(&info, *chain.pass);
     }
@@ -220,7 +222,8 @@ struct Window::Impl {
             gpu.device.waitIdle();
         } catch (const std::exception&) {  // a lost device: nothing is drawn any more
         }
-        ImGui_ImplVulkan_Shutdown();
+        // After a failure between two of its calls it still has what the first has freed, and would free it again.
+        if (!has_failed_in_imgui) ImGui_ImplVulkan_Shutdown();
         ImGui_ImplGlfw_Shutdown();
         when_lost = {};
     }
@@ -284,6 +287,7 @@ struct Window::Impl {
         return !chain.is_old;
     }
 
+    static inline bool has_failed_in_imgui = false;  // a function of Vulkan that it called
     Glfw glfw;
     WindowHandle handle;
     Interface interface;

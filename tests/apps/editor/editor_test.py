@@ -703,6 +703,33 @@ class Failures(Case):
         self.edit(scene, script="wait 0.5\nexpect-control Take them\nclick Take them\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
         self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
 
+    def test_memory_of_the_device_ends_in_any_call(self):
+        """Also in those that the library of the window makes, which then has half of what it frees."""
+        failures = 0
+        for allocations in range(8, 22):
+            scene = self.scene("cumulus.toml")
+            script = """
+                wait-step 1
+                click sun
+                set sun.elevation_deg 21
+                wait 0.3
+                resize 900 700
+                wait 0.3
+                resize 1200 800
+                wait 0.3
+                key CTRL+S
+                wait 0.3
+                """
+            environment = {"VK_LAYER_PATH": os.environ["LAYERS"], "VK_INSTANCE_LAYERS": "VK_LAYER_NEPHOS_lost_device",
+                           "NEPHOS_REFUSE_MEMORY_AFTER": str(allocations)}
+            done = subprocess.run(self.command(scene, script=script), capture_output=True, text=True, timeout=540, cwd=self.folder,
+                                  env={**self.environment, **environment}, check=False)
+            self.assertIn(done.returncode, (0, 4), (allocations, done.stdout + done.stderr))
+            failures += done.returncode == 4
+            if done.returncode == 4:
+                self.assertIn("the graphics device failed", done.stderr)
+        self.assertGreater(failures, 3)
+
     def test_scenes(self):
         self.assertIn("no/such.toml", self.edit("no/such.toml", status=3))
         empty = self.folder / "empty"
