@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/export/export_list.h"
 
+#include <cerrno>
 #include <cstdint>
+#include <cstring>
+#include <fstream>
 #include <system_error>
 #include <vector>
 
+#include <fcntl.h>
 #include <nlohmann/json.hpp>
+#include <unistd.h>
 
 #include "core/atomic_file.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/paths.h"
 #include "simulation/checked_json.h"
@@ -143,7 +149,7 @@ bool is_export_folder(const std::filesystem::path& folder) {
 
 ExportList::ExportList(const FolderLock& lock, const ExportOptions& options,
                        const std::vector<ExportSequence>& sequences)
-    : folder_(options.folder), work_(lock) {
+    : lock_(lock), folder_(options.folder), work_(lock) {
     head_ = head_json(options, sequences).dump(2, ' ', false, Json::error_handler_t::replace);
     claim(folder_);
     if (!is_export_folder(folder_)) return;
@@ -254,6 +260,8 @@ void ExportList::write(bool complete) const {
         for (const auto& [name, file] : earlier_) add(name, file);
     }
     json["files"] = std::move(files);
+    const std::function<void()> check = [this] { lock_.require_in_place(); };
+    const PublishCheck keeps_in_place(check);
     write_atomically(folder_ / "export.json",
                      std::string_view(sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace))));
 }
@@ -281,12 +289,24 @@ void ExportList::end(bool complete) {
     write(true);  // the last of all: nothing is in the folder that it does not list
 }
 
-std::vector<std::string> ExportList::remove_left_over() const {
+// Removes a file of the folder that is locked, if it is the one that is open.
+void ExportList::remove(const std::string& name, const Descriptor& file) const {
+    lock_.require_in_place();
+    const std::filesystem::path path = folder_ / name;
+    if (!is_same_file(file.get(), path))
+        throw Error(ErrorCode::io, path.string() + ": was replaced while the export was writing");
+    if (::unlinkat(lock_.descriptor(), name.c_str(), 0) != 0)
+        throw Error(ErrorCode::io, path.string() + ": cannot remove: " + std::strerror(errno));
+}
+
+std::vector<std::string> ExportList::remove_left_over() {
     std::set<std::string> listed;
     for (const ExportedFile& file : files_) listed.insert(file.path.generic_string());
     std::size_t removed = 0;
     std::vector<std::string> notes;
-    for (const auto& [name, file] : earlier_) {
+    for (auto at = earlier_.begin(); at != earlier_.end();) {
+        const auto present = at++;
+        const auto& [name, file] = *present;
         std::error_code error;
         const std::filesystem::path path = folder_ / name;
         if (listed.contains(name) || !std::filesystem::is_regular_file(path, error)) continue;
@@ -294,12 +314,14 @@ std::vector<std::string> ExportList::remove_left_over() const {
             notes.push_back(path.string() + ": is not in the folder itself: it stays");
             continue;
         }
-        if (!(file_digest(path) == file.digest)) {
+        const Descriptor opened = open_regular_file(path, O_RDONLY);
+        std::ifstream content = open_stream("/proc/self/fd/" + std::to_string(opened.get()));
+        if (!(file_digest(content, path) == file.digest)) {
             notes.push_back(path.string() + ": is of an earlier export and was changed since: it stays");
             continue;
         }
-        std::filesystem::remove(path, error);
-        if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
+        remove(name, opened);
+        earlier_.erase(present);
         ++removed;
     }
     if (removed > 0)

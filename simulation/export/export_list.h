@@ -55,7 +55,7 @@ class ExportList {
     void add_written(ExportedFile file);
     // Removes what an earlier export wrote and this one does not list, so that the folder holds what was asked for last; but not
     // what somebody changed since. Returns what is to be told of that. Throws Error(io).
-    std::vector<std::string> remove_left_over() const;
+    std::vector<std::string> remove_left_over();
     // Writes the list, of one that is not complete with what was written beyond it and what an earlier one had listed, and ends the
     // work. Nothing is written after it. Throws Error(io).
     void end(bool complete);
@@ -67,9 +67,11 @@ class ExportList {
 
   private:
     void write(bool complete) const;
+    void remove(const std::string& name, const Descriptor& file) const;
     void require_files() const;
     std::string below_folder(const std::filesystem::path& source) const;
 
+    const FolderLock& lock_;
     std::filesystem::path folder_;
     std::string head_;  // JSON of all but the files
     ExportWork work_;

@@ -133,6 +133,10 @@ void ExportWork::begin() {
     }
     try {
         open();
+        struct stat status {};
+        if (::fstat(work_.get(), &status) != 0) fail(path_, "cannot be examined", errno);
+        if (!is_trusted_owner(status.st_uid) || !names_in_folder(held_path_of({})).empty())
+            throw_in_the_way(path_);  // put there since
         notes_.reset(::openat(work_.get(), kNotes,
                               O_WRONLY | O_APPEND | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
         if (notes_.get() < 0) fail(path_ / kNotes, "cannot create", errno);
@@ -204,6 +208,7 @@ void ExportWork::place(const std::string& name) {
 
 void ExportWork::copy_to_free_place(const std::string& name) const {
     const std::filesystem::path place = folder_ / name;
+    if (stands_there(place)) throw_place_taken(place);
     const AtomicFile copy(place);  // removes its file where that gets no place
     std::error_code failed;
     std::filesystem::copy_file(held_path_of(name), copy.temporary(),

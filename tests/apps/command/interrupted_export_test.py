@@ -231,6 +231,40 @@ class InterruptedExport(Case):
                 shutil.rmtree(self.folder / "own")
             shutil.rmtree(self.folder / "other", ignore_errors=True)
 
+    def test_a_folder_put_there_while_left_over_files_are_removed(self):
+        """Nothing of it is removed or replaced; and what was removed of its own is listed no more."""
+        for first, path, swaps in ((1, "placed_0003.raw", True), (1, "export.json.", True), (2, "export.json.", True), (1, "placed_0003.raw", False)):
+            self.export("out", "--to", "raw")
+            self.export("other", "--to", "raw", "--type", "r16")
+            before = {file.name: file.read_bytes() for file in (self.folder / "other").iterdir()}
+            call = "read" if path.endswith("raw") else "open"
+            environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"{call} STOP {first} 1",
+                           "FAIL_PATH": path if path.endswith("raw") else "out/.export.part"}
+            process = subprocess.Popen([NEPHOS, "export", "run", "--to", "raw", "--frames", "1..2", "-o", "out"], cwd=self.folder,
+                                       env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+            os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+            if swaps:
+                (self.folder / "out").rename(self.folder / "away")
+                (self.folder / "other").rename(self.folder / "out")
+            else:
+                (self.folder / "out/placed_0003.raw").unlink()
+                (self.folder / "out/placed_0003.raw").write_text("mine")
+            process.send_signal(signal.SIGCONT)
+            error = process.communicate(timeout=120)[1]
+            self.assertEqual(process.returncode, 3, error)
+            if swaps:
+                self.assertIn("was removed or renamed", error)
+                self.assertEqual({file.name: file.read_bytes() for file in (self.folder / "out").iterdir()}, before, (first, path))
+                self.call("verify", "out")
+            else:
+                self.assertEqual((self.folder / "out/placed_0003.raw").read_text(), "mine")
+            for name in ("out", "other", "away"):
+                shutil.rmtree(self.folder / name, ignore_errors=True)
+        self.export("out", "--to", "raw")
+        self.killed("rename", 3, "out/export.json", "--to", "raw", "--frames", "1..2", "-o", "out")
+        (self.folder / "out/placed_0003.raw").write_text("mine")
+        self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0003.raw: is there already, and no export of this has listed it")
+
     def test_what_an_export_refuses_leaves_the_one_before_complete(self):
         folder = self.export("out", "--to", "raw")
         before = {path.name: path.read_bytes() for path in folder.iterdir()}
