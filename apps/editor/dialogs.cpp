@@ -8,6 +8,7 @@
 
 #include "apps/editor/field_text.h"
 #include "apps/editor/state.h"
+#include "apps/nephos/arguments.h"
 #include "core/error.h"
 
 namespace nephos {
@@ -54,12 +55,17 @@ bool accept(Editor& editor, const fs::path& path) {
                 ask_before(editor, Pending::open, path);
                 return true;
             case FileDialog::save_as:
+                for_each_scene(editor, [&](const OpenScene& open) {
+                    if (const Scene* const scene = open.document->current_scene())
+                        refuse_to_replace_files_of(*scene, path);
+                });
                 editor.document->save_as(path);
                 note_recent(editor.settings, path);
                 keep_settings(editor);
                 say(editor, "Saved " + path.string());
                 return true;
             case FileDialog::export_grid:
+                refuse_own_files(editor, path, true);
                 start_export(editor, path);
                 return true;
             case FileDialog::screenshot:
@@ -194,6 +200,15 @@ void file_dialog(Editor& editor) {
     ImGui::EndPopup();
 }
 
+bool is_anything_unsaved(Editor& editor) {
+    bool any = false;
+    for_each_scene(editor, [&](OpenScene& scene) {
+        scene.document->look_at_disk();
+        any |= scene.document->is_modified();
+    });
+    return any;
+}
+
 void shortcuts_window(Editor& editor) {
     if (!editor.show_shortcuts) return;
     static constexpr std::array<std::array<const char*, 2>, 28> kKeys{{
@@ -273,6 +288,10 @@ void ask_before(Editor& editor, Pending what, fs::path path) {
     editor.pending = what;
     editor.pending_path = std::move(path);
     editor.document->look_at_disk();  // it may be gone since
+    // What is asked is of the scene that is shown, and comes first: dialogs() goes on with the end of the program.
+    const bool is_asked =
+        editor.question || editor.dialog != FileDialog::none || !editor.left_autosaves.empty();
+    if (what == Pending::close && is_asked && is_anything_unsaved(editor)) return;
     const bool replaces = !beside && !is_grid(editor.pending_path);
     if (!replaces || !editor.document->is_modified()) do_pending(editor);
 }

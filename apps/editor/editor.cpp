@@ -360,17 +360,19 @@ std::string kept_edits(Editor& editor) {
 
 }  // namespace
 
-void refuse_own_files(const Editor& editor, const std::filesystem::path& file, bool was_asked) {
-    const SceneDocument& document = *editor.document;
-    if (document.has_file()) refuse_to_replace(document.path(), file);
-    if (const Scene* const scene = document.current_scene())
-        refuse_to_replace_files_of(*scene, file);
-    else if (is_there(file) &&
-             (!was_asked || document.text().find(file.filename().string()) != std::string::npos))
-        throw Error(ErrorCode::usage,
-                    file.string() +
-                        ": is there already, and may be a file of the scene, whose text has "
-                        "problems: expected the name of another one to write");
+void refuse_own_files(Editor& editor, const std::filesystem::path& file, bool was_asked) {
+    for_each_scene(editor, [&](const OpenScene& open) {
+        const SceneDocument& document = *open.document;
+        if (document.has_file()) refuse_to_replace(document.path(), file);
+        if (const Scene* const scene = document.current_scene())
+            refuse_to_replace_files_of(*scene, file);
+        else if (is_there(file) &&
+                 (!was_asked || document.text().find(file.filename().string()) != std::string::npos))
+            throw Error(ErrorCode::usage,
+                        file.string() +
+                            ": is there already, and may be a file of the scene, whose text has "
+                            "problems: expected the name of another one to write");
+    });
 }
 
 Editor::Editor(const EditorOptions& from)

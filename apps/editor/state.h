@@ -276,9 +276,9 @@ void ask_before(Editor& editor, Pending what, std::filesystem::path path = {});
 void forget_pending(Editor& editor);
 // Returns whether a question or a file dialog waits for an answer: keys have no other meaning then.
 bool is_asking(const Editor& editor);
-// Throws Error(usage) where a file that is written would replace the scene, or a file that it names; while the text has problems,
-// one whose name stands in it, and where nobody was asked, anything.
-void refuse_own_files(const Editor& editor, const std::filesystem::path& file, bool was_asked);
+// Throws Error(usage) where a file that is written would replace one of the open scenes, or a file that it names; while its text has
+// problems, one whose name stands in it, and where nobody was asked, anything.
+void refuse_own_files(Editor& editor, const std::filesystem::path& file, bool was_asked);
 // Asks first when another program has written the file. Returns whether it was saved.
 bool save_document(Editor& editor);
 // Writes window, panels, theme and recent files down; what goes wrong is said.

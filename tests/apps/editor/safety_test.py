@@ -15,7 +15,7 @@ import unittest
 from PIL import Image, ImageChops, ImageStat
 
 from case import NEPHOS, Case, Screen
-from kept import MODELS, Kept
+from kept import MODELS, WIND, Kept
 
 
 class Safety(Kept):
@@ -405,12 +405,61 @@ class Safety(Kept):
             self.assertEqual((self.folder / "gone.toml").exists(), answer == "Take them")
         self.assertIn("seed = 12", (self.folder / "gone.toml").read_text(encoding="utf-8"))
 
-    def test_scripts_replace_no_file_of_the_scene(self):
+    def test_the_cross_leaves_a_dialog_to_its_scene(self):
+        """What is answered is of the scene that was shown when it was asked, though another one has the edits."""
         scene = self.models()
-        for command in ("picture", "hashes", "screenshot"):
-            said = self.edit(scene, script=f"wait-step 1\nwait-picture\n{command} {scene}\nwait 1\n", status=2)
-            self.assertIn("is the file that is read", said)
+        for ending in ("set \"file name\" copy.toml", "click Cancel"):
+            self.edit(scene, "--validation", script=f"""
+                wait-step 1
+                click "copy simulation"
+                wait-step 1
+                click scene
+                set seed 77
+                click "simulation 1"
+                wait 0.5
+                key CTRL+SHIFT+S
+                wait 0.5
+                close-window
+                wait 0.5
+                {ending}
+                wait 0.5
+                expect-control "unsaved models-2.toml"
+                click "Discard them"
+                wait 20
+                """)
             self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
+        self.assertEqual((self.folder / "copy.toml").read_text(encoding="utf-8"), MODELS)
+
+    def test_scripts_replace_no_file_of_the_scenes(self):
+        scene, other = self.models(), self.folder / "other.toml"
+        other.write_text(MODELS, encoding="utf-8")
+        beside = f"click \"open simulation\"\nwait 0.5\nset \"file name\" {other}\nwait 1\nwait-step 1\nclick \"simulation 1\"\nwait 0.5\n"
+        for command in ("picture", "hashes", "screenshot"):
+            for path in (scene, other):
+                said = self.edit(scene, script=f"wait-step 1\n{beside}wait-picture\n{command} {path}\nwait 1\n", status=2)
+                self.assertIn("is the file that is read", said)
+                self.assertEqual(path.read_text(encoding="utf-8"), MODELS)
+
+    def test_a_grid_replaces_no_file_of_the_scene(self):
+        scene, state = self.folder / "wind.toml", self.folder / "state.vdb"
+        scene.write_text(WIND, encoding="utf-8")
+        subprocess.run([NEPHOS, "state", scene, "--steps", "2", "-o", state], check=True, capture_output=True)
+        scene.write_text(WIND.replace("[lattice]", "[lattice]\ninitial_state = \"state.vdb\""), encoding="utf-8")
+        before = state.read_bytes()
+        self.edit(scene, script=f"""
+            wait-step 1
+            click "menu File"
+            click "menu Export the grid..."
+            wait 0.5
+            set "file name" {state}
+            wait 0.5
+            click "Replace it"
+            wait 0.5
+            expect-control Cancel
+            click Cancel
+            wait 0.5
+            """)
+        self.assertEqual(state.read_bytes(), before)
 
     def test_a_picture_that_cannot_be_saved(self):
         """A picture of the window into a folder that cannot be made: said, and the program goes on."""
