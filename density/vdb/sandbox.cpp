@@ -216,6 +216,9 @@ class PipeReader final : public SandboxReader {
             pollfd poll_fd{fd_, POLLIN, 0};
             const int ready = ::poll(&poll_fd, 1, int(std::min<long long>(left, 500)));
             if (ready > 0) return;
+            if (ready < 0 && errno != EINTR)
+                throw std::runtime_error(std::string(kCannotRead) +
+                                         "cannot hear the reading process: " + std::strerror(errno));
             if (ready == 0 && may_restart_) check_stall();
         }
     }

@@ -124,21 +124,22 @@ Json parsed_list(const std::filesystem::path& path) {
 }
 
 // Removes the temporary files that a killed export left. Throws Error(usage) when anything is there and no export.
-void claim(const std::filesystem::path& folder) {
-    std::error_code error;
-    std::vector<std::filesystem::path> leftovers;
+void claim(const FolderLock& lock) {
+    const std::filesystem::path& folder = lock.path();
+    std::vector<std::string> leftovers;
     for (const std::string& name : names_in_folder(folder)) {
         if (name == kExportWork) continue;  // ExportWork::begin() removes it
         if (!published_name(name).empty()) {
-            leftovers.push_back(folder / name);
+            leftovers.push_back(name);
         } else if (!is_export_folder(folder)) {
             throw Error(ErrorCode::usage,
                         folder.string() + ": is not empty and holds no export: choose another folder");
         }
     }
-    for (const std::filesystem::path& leftover : leftovers)
-        if (!error) std::filesystem::remove(leftover, error);
-    if (error) throw Error(ErrorCode::io, folder.string() + ": cannot be examined: " + error.message());
+    lock.require_in_place();  // what was listed is in the folder that is locked
+    for (const std::string& name : leftovers)
+        if (::unlinkat(lock.descriptor(), name.c_str(), 0) != 0 && errno != ENOENT)
+            throw Error(ErrorCode::io, (folder / name).string() + ": cannot remove: " + std::strerror(errno));
 }
 
 }  // namespace
@@ -151,7 +152,7 @@ ExportList::ExportList(const FolderLock& lock, const ExportOptions& options,
                        const std::vector<ExportSequence>& sequences)
     : lock_(lock), folder_(options.folder), work_(lock) {
     head_ = head_json(options, sequences).dump(2, ' ', false, Json::error_handler_t::replace);
-    claim(folder_);
+    claim(lock);
     if (!is_export_folder(folder_)) return;
     const std::filesystem::path path = folder_ / "export.json";
     Json json = parsed_list(path);
@@ -173,7 +174,7 @@ ExportList::ExportList(const FolderLock& lock, const ExportOptions& options,
     }
     for (ExportedFile& file : noted_files(folder_)) {
         std::string name = file.path.generic_string();
-        noted_.insert(name);
+        has_notes_ = true;
         if (type_behind(folder_ / name) == std::filesystem::file_type::regular &&
             file_digest(folder_ / name) == file.digest)
             earlier_[std::move(name)] = std::move(file);
@@ -183,7 +184,7 @@ ExportList::ExportList(const FolderLock& lock, const ExportOptions& options,
 void ExportList::require_free(const std::vector<std::string>& names) const {
     for (const std::string& name : names)
         if (!earlier_.contains(name) && stands_there(folder_ / name))
-            throw_place_taken(folder_ / name, was_interrupted_ && noted_.empty());
+            throw_place_taken(folder_ / name, was_interrupted_ && !has_notes_);
 }
 
 void ExportList::begin() {
@@ -315,7 +316,7 @@ std::vector<std::string> ExportList::remove_left_over() {
             continue;
         }
         const Descriptor opened = open_regular_file(path, O_RDONLY);
-        std::ifstream content = open_stream("/proc/self/fd/" + std::to_string(opened.get()));
+        std::ifstream content("/proc/self/fd/" + std::to_string(opened.get()), std::ios::binary);
         if (!(file_digest(content, path) == file.digest)) {
             notes.push_back(path.string() + ": is of an earlier export and was changed since: it stays");
             continue;

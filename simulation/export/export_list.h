@@ -76,7 +76,7 @@ class ExportList {
     std::string head_;  // JSON of all but the files
     ExportWork work_;
     bool was_interrupted_ = false;
-    std::set<std::string> noted_;  // by an export that was killed; what stands there may be another file
+    bool has_notes_ = false;                       // an export that was killed has left some
     std::map<std::string, ExportedFile> earlier_;  // what was there, by its name
     std::map<std::string, ExportedFile>
         made_;          // what this one has written, also of frames whose turn has not come

@@ -33,8 +33,7 @@ constexpr std::size_t kMostNote = std::size_t(64) << 10;  // bytes; paths have a
 }
 
 // Returns whether a folder has what an export leaves in its own: notes, files and no folders; or nothing.
-bool is_of_export(const std::filesystem::path& work) {
-    const std::vector<std::string> names = names_in_folder(work);
+bool is_of_export(const std::filesystem::path& work, const std::vector<std::string>& names) {
     const auto is_file = [&](const std::string& name) {
         return type_at(work / name) == std::filesystem::file_type::regular;
     };
@@ -107,7 +106,8 @@ ExportWork::ExportWork(const FolderLock& lock)
     if (!S_ISDIR(status.st_mode) || !is_trusted_owner(status.st_uid)) throw_in_the_way(path_);
     open();
     if (::fstat(work_.get(), &status) != 0) fail(path_, "cannot be examined", errno);
-    if (!is_trusted_owner(status.st_uid) || !is_of_export(held_path_of({}))) throw_in_the_way(path_);
+    if (!is_trusted_owner(status.st_uid) || !is_of_export(held_path_of({}), held_names()))
+        throw_in_the_way(path_);
 }
 
 void ExportWork::open() {
@@ -124,8 +124,10 @@ bool ExportWork::is_trusted_owner(unsigned user) const {
 
 void ExportWork::begin() {
     if (work_.get() >= 0) {
-        if (!is_same_file(work_.get(), path_)) throw_in_the_way(path_);
-        clear();
+        if (is_same_file(work_.get(), path_))
+            clear();
+        else if (stands_there(path_))
+            throw_in_the_way(path_);
     }
     if (::mkdirat(lock_.descriptor(), kExportWork, 0700) != 0) {
         if (errno == EEXIST) throw_in_the_way(path_);
@@ -135,7 +137,7 @@ void ExportWork::begin() {
         open();
         struct stat status {};
         if (::fstat(work_.get(), &status) != 0) fail(path_, "cannot be examined", errno);
-        if (!is_trusted_owner(status.st_uid) || !names_in_folder(held_path_of({})).empty())
+        if (!is_trusted_owner(status.st_uid) || !held_names().empty())
             throw_in_the_way(path_);  // put there since
         notes_.reset(::openat(work_.get(), kNotes,
                               O_WRONLY | O_APPEND | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
@@ -158,7 +160,7 @@ void ExportWork::clear() {
         if (::unlinkat(work_.get(), name, 0) != 0 && errno != ENOENT)
             fail(path_ / name, "cannot remove", errno);
     };
-    for (const std::string& name : names_in_folder(held_path_of({})))
+    for (const std::string& name : held_names())
         if (name != kNotes) remove(name.c_str());
     remove(kNotes);
     if (::unlinkat(lock_.descriptor(), kExportWork, AT_REMOVEDIR) != 0) fail(path_, "cannot remove", errno);
@@ -176,8 +178,15 @@ void ExportWork::write(const std::string& name,
     try {
         write(held);
     } catch (const Error& error) {
-        throw Error(error.code(), renamed(error.what(), held.parent_path().string(), path_.string()));
+        throw Error(error.code(),
+                    renamed(error.what(), (held.parent_path() / "").string(), (path_ / "").string()));
     }
+}
+
+std::vector<std::string> ExportWork::held_names() const {
+    std::vector<std::string> names;
+    write({}, [&](const std::filesystem::path& held) { names = names_in_folder(held); });
+    return names;
 }
 
 FileDigest ExportWork::digest_of(const std::string& name) const {

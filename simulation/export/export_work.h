@@ -51,7 +51,8 @@ class ExportWork {
     // Gives a noted file its place. Thread-safe. Throws Error(io); Error(usage) naming what stands there. After an exception the
     // file has no place.
     void place(const std::string& name);
-    // The same where a file is listed: its content is replaced, its owner and permissions stay, and links lead to it. Throws Error(io).
+    // The same where a file is listed: its content is replaced, its permissions stay, and links lead to it (copy_atomically()). Throws
+    // Error(io).
     void replace(const std::string& name);
     // Flushes the names of all places to the device, once they are begun. Throws Error(io).
     void flush() const;
@@ -64,6 +65,7 @@ class ExportWork {
     void copy_to_free_place(const std::string& name) const;
     bool is_trusted_owner(unsigned user) const;
     std::filesystem::path held_path_of(const std::string& name) const;
+    std::vector<std::string> held_names() const;
 
     const FolderLock& lock_;
     const std::filesystem::path folder_, path_;  // of the export; the hidden one in it

@@ -22,7 +22,10 @@ std::atomic<bool> is_forked{false};
 
 template <class Function>
 Function* original(const char* name) {
-    return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
+    void* const found = dlsym(RTLD_NEXT, name);
+    if (found == nullptr)
+        std::abort();  // another version of the library: what is called there is not watched
+    return reinterpret_cast<Function*>(found);
 }
 
 void check() {

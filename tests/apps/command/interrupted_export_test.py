@@ -129,6 +129,17 @@ class InterruptedExport(Case):
         self.assertEqual(done.returncode, status, done.stderr)
         return done.stderr
 
+    @unittest.skipIf(os.geteuid() != 0, "needs another user")
+    def test_verify_by_another_user(self):
+        """The notes of a killed export are its user's alone: what there is, is judged without them."""
+        self.killed("rename", 3, "out/placed_", "--to", "raw", "-o", "out")
+        self.assertNotIn("listed nowhere", self.call("verify", "out", status=1).stdout)
+        os.chmod(self.folder, 0o755)
+        done = subprocess.run(["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups", NEPHOS, "verify", "out"], cwd=self.folder,
+                              env=self.environment, capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("the export was interrupted", done.stdout)
+
     def test_file_systems_that_rename_less(self):
         """Without RENAME_NOREPLACE (EINVAL), and within a folder alone (EXDEV)."""
         whole = self.export("whole", "--to", "raw")
@@ -144,6 +155,10 @@ class InterruptedExport(Case):
         self.export("none", "--to", "raw")
 
     def test_messages_name_the_hidden_folder_by_its_path(self):
+        self.killed("rename", 2, "out/placed_", "--to", "raw", "-o", "out")
+        error = self.faulty("open EIO 1 1", "/proc/self/fd/", "--to", "raw", "-o", "out", status=3)
+        self.assertIn("out/.nephos-export/: cannot read: Input/output error", error)
+        shutil.rmtree(self.folder / "out")
         for call in ("read EIO 1 1", "write ENOSPC 1 1", "open EACCES 1 1"):
             error = self.faulty(call, ".nephos-export/placed_0002" if call.startswith("read") else ".nephos-export/.placed_0002", "--to", "raw", "-o", "out", status=3)
             self.assertIn("out/.nephos-export/placed_0002.raw: cannot ", error)

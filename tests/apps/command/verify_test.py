@@ -273,6 +273,7 @@ class Verify(Case):
         """Beside the threads of the command a lock of it may be held, for which they would wait for ever."""
         scene = self.write("layered.toml", LAYERED)
         library = os.environ["FAILING_CALLS"].replace("libfailing_calls.so", "libforked_calls.so")
+        self.assertTrue(library.endswith("libforked_calls.so") and os.path.exists(library.split(":")[-1]), library)
         self.environment["LD_PRELOAD"] = library
         self.call("run", scene, "--no-render", "--out", "out")
         self.call("verify", "out", "--replay", 2)
