@@ -197,12 +197,12 @@ std::string usd_name(const std::vector<ExportSequence>& sequences) {
 
 constexpr const char *kReadme = "README.txt", *kPackets = ".cigi";
 
-// Returns the names of all files.
-std::vector<std::string> file_names(const ExportOptions& options,
+// Returns the names of all files. `run`: that of summaries of weather.
+std::vector<std::string> file_names(const ExportOptions& options, const std::optional<RunListing>& run,
                                     const std::vector<ExportSequence>& sequences) {
     std::vector<std::string> names{kReadme};
-    if (!options.weather.empty()) {
-        const std::string scene = read_run(options.source).scene.name;
+    if (run) {
+        const std::string scene = run->scene.name;
         for (const NamedWeather& named : weather_formats()) {
             if (std::ranges::count(options.weather, named.format) == 0) continue;
             names.push_back(scene + std::string(named.extension));
@@ -231,13 +231,34 @@ void write_text_file(ExportList& list, const std::string& name, std::span<const 
         name, {}, {}, [&](const std::filesystem::path& path) { write_atomically(path, content); }));
 }
 
+// Throws Error(io) unless a folder still holds the run that was read of it; it may have more frames by now.
+void require_same_run(const RunListing& run, const std::filesystem::path& source) {
+    const RunListing now = read_run(source);
+    const auto is_same_frame = [](const ListedFrame& a, const ListedFrame& b) {
+        return a.number == b.number && a.state_hash == b.state_hash;
+    };
+    if (now.scene_hash == run.scene_hash && now.frames_hash == run.frames_hash &&
+        now.frames.size() >= run.frames.size() &&
+        std::equal(run.frames.begin(), run.frames.end(), now.frames.begin(), is_same_frame))
+        return;
+    throw Error(ErrorCode::io, source.string() + ": was changed while it was exported: export it again");
+}
+
 // The summaries of a run's layers, in all forms that are wanted.
-void write_weather(const ExportOptions& options, ExportList& list, std::vector<std::string>& notes) {
-    const RunListing run = read_run(options.source);
+void write_weather(const ExportOptions& options, const RunListing& run,
+                   const std::vector<ExportSequence>& sequences, ExportList& list,
+                   std::vector<std::string>& notes) {
     std::vector<WeatherSummary> frames;
     for (const ListedFrame& frame : run.frames) {
         if (is_wanted(options, frame.number, 1)) frames.push_back(summarise(run, frame));
     }
+    // Its files were opened by their paths, those of volumes before: a folder or link of that name may lead to another run by now.
+    require_same_run(run, options.source);
+    for (const ExportSequence& s : sequences)
+        for (const SourceFrame& frame : s.frames) require_unchanged(frame);
+    if (frames.empty())
+        throw Error(ErrorCode::io,
+                    options.source.string() + ": was changed while it was exported: export it again");
     const std::vector<WeatherFormat> formats = all_weather(options);
     std::ranges::move(limit_notes(formats, frames), std::back_inserter(notes));
     const auto write_file = [&](std::string_view extension, std::span<const std::byte> content) {
@@ -294,10 +315,11 @@ void refuse_own_folder(const ExportOptions& options, const std::vector<ExportSeq
     }
 }
 
-void write_texts(const ExportOptions& options, const std::vector<ExportSequence>& sequences,
+void write_texts(const ExportOptions& options, const std::optional<RunListing>& run,
+                 const std::vector<ExportSequence>& sequences,
                  const std::vector<std::vector<FrameFigures>>& figures, ExportList& list,
                  std::vector<std::string>& notes) {
-    if (!options.weather.empty()) write_weather(options, list, notes);
+    if (run) write_weather(options, *run, sequences, list, notes);
     const auto write = [&](const std::string& name, const std::string& text) {
         write_text_file(list, name, std::as_bytes(std::span(text)), notes);
     };
@@ -331,6 +353,8 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     check_options(options);
     std::vector<std::string> notes;
     std::vector<ExportSequence> sequences = list_sequences(options, notes);
+    std::optional<RunListing> run;  // of which weather is told
+    if (!options.weather.empty()) run = read_run(options.source);
     ExportReport report = report_of(options, sequences);
     require_space(options.folder, report.needed_bytes);
     GridReader reader(options);
@@ -353,7 +377,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     refuse_own_folder(options, sequences);
     const FolderLock lock(options.folder, "export");
     ExportList list(lock, options, sequences);
-    list.require_free(file_names(options, sequences));
+    list.require_free(file_names(options, run, sequences));
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());
     const auto take = [&](const ExportSequence& s, std::vector<FrameFigures>& of, ExportedFrame&& frame) {
@@ -411,7 +435,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 return report;
             }
         }
-        write_texts(options, sequences, figures, list, notes);
+        write_texts(options, run, sequences, figures, list, notes);
         lock.require_in_place();
         std::ranges::move(list.remove_left_over(), std::back_inserter(notes));
         list.end(true);

@@ -153,7 +153,8 @@ ExportList::ExportList(const FolderLock& lock, const ExportOptions& options,
     : lock_(lock), folder_(options.folder), work_(lock) {
     head_ = head_json(options, sequences).dump(2, ' ', false, Json::error_handler_t::replace);
     claim(lock);
-    if (!is_export_folder(folder_)) return;
+    has_list_ = is_export_folder(folder_);
+    if (!has_list_) return;
     const std::filesystem::path path = folder_ / "export.json";
     Json json = parsed_list(path);
     std::vector<ExportedFile> files;
@@ -188,7 +189,9 @@ void ExportList::require_free(const std::vector<std::string>& names) const {
 }
 
 void ExportList::begin() {
+    if (!has_list_ && stands_there(folder_ / "export.json")) throw_place_taken(folder_ / "export.json");
     write(false);
+    has_list_ = true;
     work_.begin();
 }
 
@@ -282,6 +285,7 @@ void ExportList::require_files() const {
 }
 
 void ExportList::end(bool complete) {
+    if (!has_list_) return;  // it has not begun
     work_.flush();
     write(false);
     work_.end();

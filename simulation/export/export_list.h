@@ -75,6 +75,7 @@ class ExportList {
     std::filesystem::path folder_;
     std::string head_;  // JSON of all but the files
     ExportWork work_;
+    bool has_list_ = false;  // there is one, of this export or an earlier one
     bool was_interrupted_ = false;
     bool has_notes_ = false;                       // an export that was killed has left some
     std::map<std::string, ExportedFile> earlier_;  // what was there, by its name

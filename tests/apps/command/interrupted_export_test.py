@@ -280,6 +280,47 @@ class InterruptedExport(Case):
         (self.folder / "out/placed_0003.raw").write_text("mine")
         self.refused(2, "export", "run", "--to", "raw", "-o", "out", says="placed_0003.raw: is there already, and no export of this has listed it")
 
+    def test_a_list_put_there_meanwhile_stays(self):
+        """Where an export has looked for one, and not written its own yet."""
+        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "stat STOP 1 1", "FAIL_PATH": "out/placed_0001"}
+        process = subprocess.Popen([NEPHOS, "export", "run", "--to", "raw", "-o", "out"], cwd=self.folder, env=environment,
+                                   stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+        (self.folder / "out/export.json").write_text("mine")
+        process.send_signal(signal.SIGCONT)
+        error = process.communicate(timeout=60)[1]
+        self.assertEqual((process.returncode, (self.folder / "out/export.json").read_text()), (2, "mine"), error)
+        self.assertIn("export.json: is there already", error)
+
+    def test_weather_of_a_run_that_is_exchanged(self):
+        """A link that leads to another run by now, also to one without the frames asked for: refused; with the first one again it goes on."""
+        self.call("run", "placed.toml", "--no-render", "--out", "second", "--seed", "9")
+        self.call("run", "placed.toml", "--no-render", "--out", "short", "--seed", "9", "--frames", "..2")
+        latest = self.folder / "latest"
+        for formats in (["--to", "layers"], ["--to", "raw", "--to", "wpr"]):
+            for other in ("second", "short"):
+                latest.unlink(missing_ok=True)
+                latest.symlink_to("run")
+                command = ["export", "latest", *formats, "--frames", "3..4", "-o", "out"]
+                environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename STOP 1 1", "FAIL_PATH": "export.json"}
+                process = subprocess.Popen([NEPHOS, *command], cwd=self.folder, env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+                os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+                latest.unlink()
+                latest.symlink_to(other)
+                process.send_signal(signal.SIGCONT)
+                error = process.communicate(timeout=60)[1]
+                self.assertEqual(process.returncode, 3, error)
+                latest.unlink()
+                latest.symlink_to("run")
+                self.call(*command)
+                self.call("verify", "out")
+                whole = self.folder / "whole"
+                self.call("export", "latest", *formats, "--frames", "3..4", "-o", "whole")
+                self.assertEqual({file.name: file.read_bytes() for file in (self.folder / "out").iterdir()},
+                                 {file.name: file.read_bytes() for file in whole.iterdir()})
+                for name in ("out", "whole"):
+                    shutil.rmtree(self.folder / name)
+
     def test_what_an_export_refuses_leaves_the_one_before_complete(self):
         folder = self.export("out", "--to", "raw")
         before = {path.name: path.read_bytes() for path in folder.iterdir()}
