@@ -288,7 +288,7 @@ void ask_before(Editor& editor, Pending what, fs::path path) {
     editor.pending = what;
     editor.pending_path = std::move(path);
     editor.document->look_at_disk();  // it may be gone since
-    // What is asked is of the scene that is shown, and comes first: dialogs() goes on with the end of the program.
+    // Leaves the scene that is shown to what is asked of it: dialogs() goes on with the end of the program.
     const bool is_asked =
         editor.question || editor.dialog != FileDialog::none || !editor.left_autosaves.empty();
     if (what == Pending::close && is_asked && is_anything_unsaved(editor)) return;

@@ -183,7 +183,7 @@ class PipeReader final : public SandboxReader {
 
     // Reads what has come: values of a few bytes one by one would cost two system calls each.
     void refill() {
-        // What the caller did with the last of it is not the child's time.
+        // Leaves out what the caller did with the last of it: that is not the child's time.
         time_.skip();
         quiet_ = TimeAllowed(quiet_seconds_);
         for (;;) {

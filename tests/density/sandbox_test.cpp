@@ -155,7 +155,7 @@ TEST(Sandbox, StartsAnewWhereNothingComes) {
     EXPECT_EQ(told, 1);
 }
 
-// What faults.ForkedReaders preloads ends this process where a child calls oneTBB.
+// Expects the end of this process, by what faults.ForkedReaders preloads, where a child calls oneTBB.
 TEST(Sandbox, ForkedReadersThatCallOneTbbAreNoticed) {
     if (std::getenv("FORKED_CALLS") == nullptr) GTEST_SKIP() << "nothing is preloaded";
     const auto parallel = [](SandboxWriter& writer) {
