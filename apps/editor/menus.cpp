@@ -271,11 +271,9 @@ void view_options_panel(Editor& editor) {
         "or the "
         "probabilities of its field, from blue to red for the largest in the slice");
     if (editor.slice_of >= SliceOf::p_hum) ImGui::TextDisabled("red: %.4g per step", editor.slice_most);
-    if (editor.slice_of != SliceOf::nothing && editor.shown_scene) {
-        const Scene& scene = *editor.shown_scene;
-        const int height = scene.layers.empty() ? scene.automaton.extent.z : scene.layers.front().extent.z;
+    if (editor.slice_of != SliceOf::nothing && editor.slice_cells > 0) {
         ImGui::SetNextItemWidth(-1);
-        ImGui::SliderInt("##slice", &editor.slice, 0, std::max(0, height - 1), "cell %d from below",
+        ImGui::SliderInt("##slice", &editor.slice, 0, editor.slice_cells - 1, "cell %d from below",
                          ImGuiSliderFlags_AlwaysClamp);
         editor.controls.note("slice");
     }

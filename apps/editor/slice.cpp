@@ -75,7 +75,8 @@ void slice_over_picture(Editor& editor) {
     const auto shown = frame ? shown_lattice(editor, frame->frame) : std::nullopt;
     if (!shown) return;
     const Extent& cells = shown->cld.extent;
-    const int k = std::clamp(editor.slice, 0, cells.z - 1);
+    editor.slice_cells = cells.z;
+    const int k = editor.slice = std::clamp(editor.slice, 0, cells.z - 1);
     int stride = 1;
     while ((cells.x / stride) * (cells.y / stride) > kMostCells) ++stride;
     const Vec3& origin = shown->placement.origin_m;

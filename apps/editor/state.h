@@ -180,6 +180,7 @@ struct Editor : OpenScene {
     int tab = 0, wanted_tab = -1;         // properties, text
     SliceOf slice_of = SliceOf::nothing;  // what a slice over the picture shows
     int slice = 0;                        // its height, in cells
+    int slice_cells = 0;  // the height of the lattice that it goes through; 0: none was shown yet
     double slice_most = 0;                // the largest probability in it
     bool show_gizmos = true, show_plots = true;
     bool flash_on_click = false;  // the next click on the picture is lightning
