@@ -25,11 +25,23 @@ class InterruptedExport(Case):
     KINDS = (["--for", "blender"], ["--for", "unreal"], ["--to", "vdb", "--voxel", "200"], ["--to", "raw", "--to", "layers", "--to", "cigi"],
              ["--to", "usd", "--to", "vdb"], ["--to", "nvdb"], ["--to", "vti"], ["--for", "flightgear"])
 
+    def faulty(self, plan, path, *arguments, status):
+        """An export of which calls of the system fail."""
+        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": plan, "FAIL_PATH": path}
+        done = subprocess.run([NEPHOS, "export", "run", *arguments], cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, status, done.stderr)
+        return done.stderr
+
     def killed(self, call, first, path, *arguments):
         """An export that is killed at a call of the system on files with this in their path."""
-        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"{call} KILL {first} 1", "FAIL_PATH": path}
-        done = subprocess.run([NEPHOS, "export", "run", *arguments], cwd=self.folder, env=environment, capture_output=True, check=False)
-        self.assertEqual(done.returncode, -signal.SIGKILL, done.stderr)
+        self.faulty(f"{call} KILL {first} 1", path, *arguments, status=-signal.SIGKILL)
+
+    def stopped(self, plan, path, *command):
+        """A command that has stopped at a call of the system on files with this in their path, and goes on by SIGCONT."""
+        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": plan, "FAIL_PATH": path}
+        process = subprocess.Popen([NEPHOS, *command], cwd=self.folder, env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+        return process
 
     def test_a_killed_export_knows_its_files(self):
         """It goes on, whatever it writes and wherever it was killed, and what is there in the end is what an undisturbed one has written."""
@@ -109,10 +121,7 @@ class InterruptedExport(Case):
         (self.folder / "victim").mkdir()
         (self.folder / "victim/letter.txt").write_text("mine")
         self.killed("rename", 2, "out/placed_", "--to", "raw", "-o", "out")
-        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename STOP 1 1", "FAIL_PATH": "export.json"}
-        process = subprocess.Popen([NEPHOS, "export", "run", "--to", "raw", "-o", "out"], cwd=self.folder, env=environment,
-                                   stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+        process = self.stopped("rename STOP 1 1", "export.json", "export", "run", "--to", "raw", "-o", "out")
         (self.folder / "out/.nephos-export").rename(self.folder / "away")
         (self.folder / "out/.nephos-export").symlink_to("../victim")
         process.send_signal(signal.SIGCONT)
@@ -121,13 +130,6 @@ class InterruptedExport(Case):
         self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
         (self.folder / "out/.nephos-export").unlink()
         self.export("out", "--to", "raw")
-
-    def faulty(self, plan, path, *arguments, status, **more):
-        """An export of which calls of the system fail."""
-        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": plan, "FAIL_PATH": path, **more}
-        done = subprocess.run([NEPHOS, "export", "run", *arguments], cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
-        self.assertEqual(done.returncode, status, done.stderr)
-        return done.stderr
 
     @unittest.skipIf(os.geteuid() != 0, "needs another user")
     def test_verify_by_another_user(self):
@@ -171,10 +173,7 @@ class InterruptedExport(Case):
             for owner in (0, 65534):
                 if was_killed:
                     self.killed("rename", 2, "out/placed_", "--to", "raw", "-o", "out")
-                environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename STOP 1 1", "FAIL_PATH": "export.json"}
-                process = subprocess.Popen([NEPHOS, "export", "run", "--to", "raw", "-o", "out"], cwd=self.folder, env=environment,
-                                           stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-                os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+                process = self.stopped("rename STOP 1 1", "export.json", "export", "run", "--to", "raw", "-o", "out")
                 hidden = self.folder / "out/.nephos-export"
                 if was_killed:
                     hidden.rename(self.folder / "away")
@@ -223,9 +222,7 @@ class InterruptedExport(Case):
             else:
                 shutil.rmtree(self.folder / "own")
             before = {file.name: file.read_bytes() for file in (self.folder / "other").iterdir()}
-            environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "fsync STOP 1 1", "FAIL_PATH": "tiny_0006"}
-            process = subprocess.Popen([NEPHOS, *whole], cwd=self.folder, env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-            os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+            process = self.stopped("fsync STOP 1 1", "tiny_0006", *whole)
             if act == "exchange":
                 (self.folder / "own").rename(self.folder / "away")
                 (self.folder / "other").rename(self.folder / "own")
@@ -253,11 +250,7 @@ class InterruptedExport(Case):
             self.export("other", "--to", "raw", "--type", "r16")
             before = {file.name: file.read_bytes() for file in (self.folder / "other").iterdir()}
             call = "read" if path.endswith("raw") else "open"
-            environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"{call} STOP {first} 1",
-                           "FAIL_PATH": path if path.endswith("raw") else "out/.export.part"}
-            process = subprocess.Popen([NEPHOS, "export", "run", "--to", "raw", "--frames", "1..2", "-o", "out"], cwd=self.folder,
-                                       env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-            os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+            process = self.stopped(f"{call} STOP {first} 1", path if path.endswith("raw") else "out/.export.part", "export", "run", "--to", "raw", "--frames", "1..2", "-o", "out")
             if swaps:
                 (self.folder / "out").rename(self.folder / "away")
                 (self.folder / "other").rename(self.folder / "out")
@@ -282,10 +275,7 @@ class InterruptedExport(Case):
 
     def test_a_list_put_there_meanwhile_stays(self):
         """Where an export has looked for one, and not written its own yet."""
-        environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "stat STOP 1 1", "FAIL_PATH": "out/placed_0001"}
-        process = subprocess.Popen([NEPHOS, "export", "run", "--to", "raw", "-o", "out"], cwd=self.folder, env=environment,
-                                   stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+        process = self.stopped("stat STOP 1 1", "out/placed_0001", "export", "run", "--to", "raw", "-o", "out")
         (self.folder / "out/export.json").write_text("mine")
         process.send_signal(signal.SIGCONT)
         error = process.communicate(timeout=60)[1]
@@ -302,9 +292,7 @@ class InterruptedExport(Case):
                 latest.unlink(missing_ok=True)
                 latest.symlink_to("run")
                 command = ["export", "latest", *formats, "--frames", "3..4", "-o", "out"]
-                environment = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename STOP 1 1", "FAIL_PATH": "export.json"}
-                process = subprocess.Popen([NEPHOS, *command], cwd=self.folder, env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-                os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+                process = self.stopped("rename STOP 1 1", "export.json", *command)
                 latest.unlink()
                 latest.symlink_to(other)
                 process.send_signal(signal.SIGCONT)
