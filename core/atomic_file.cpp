@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <random>
 #include <string>
@@ -243,6 +244,25 @@ int AtomicFile::open_again() const {
 }
 
 void AtomicFile::publish() {
+    flush();
+    if (::renameat(folder_, temporary_name_.c_str(), folder_, name_.c_str()) != 0)
+        fail(path_, "cannot rename into place", errno);
+    published_ = true;
+    flush_folder();
+}
+
+bool AtomicFile::publish_where_free() {
+    flush();
+    const int error = rename_where_free(folder_, temporary_name_, folder_, name_);
+    if (error == EEXIST) return false;
+    if (error != 0) fail(path_, "cannot rename into place", error);
+    published_ = true;
+    flush_folder();
+    return true;
+}
+
+// Makes sure that the temporary file is the one that was made, and gives it its permissions.
+void AtomicFile::flush() const {
     struct stat status {};
     // By its path, as its writer found it: in another folder of that name there would be its content.
     if (::lstat(temporary_.c_str(), &status) != 0) fail(path_, "its temporary file is gone", errno);
@@ -262,12 +282,22 @@ void AtomicFile::publish() {
         ::fchmod(file.get(), *permissions_) != 0)
         fail(path_, "cannot set its permissions", errno);
     check_before_publishing();
-    if (::renameat(folder_, temporary_name_.c_str(), folder_, name_.c_str()) != 0)
-        fail(path_, "cannot rename into place", errno);
-    published_ = true;
+}
+
+void AtomicFile::flush_folder() const {
     const int unflushed = flush_to_device(folder_);
     if (unflushed != 0 && unflushed != EINVAL && unflushed != EBADF)  // which may not be listed
         fail(path_, "cannot flush its folder to the device", unflushed);
+}
+
+int rename_where_free(int from_folder, const std::string& from, int to_folder, const std::string& to) {
+    if (::renameat2(from_folder, from.c_str(), to_folder, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+    if (errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP) return errno;
+    // A file system that cannot, as some network ones.
+    struct stat status {};
+    if (::fstatat(to_folder, to.c_str(), &status, AT_SYMLINK_NOFOLLOW) == 0) return EEXIST;
+    if (errno != ENOENT) return errno;
+    return ::renameat(from_folder, from.c_str(), to_folder, to.c_str()) == 0 ? 0 : errno;
 }
 
 void write_atomically(const std::filesystem::path& path,
@@ -277,9 +307,11 @@ void write_atomically(const std::filesystem::path& path,
     file.publish();
 }
 
-void write_pieces_atomically(const std::filesystem::path& path,
-                             const std::function<void(const AppendPiece& append)>& fill, Folders folders) {
-    AtomicFile file(path, Access::shared, folders);
+namespace {
+
+using FillPieces = std::function<void(const AppendPiece& append)>;
+
+void write_pieces(const AtomicFile& file, const std::filesystem::path& path, const FillPieces& fill) {
     Descriptor descriptor(::open(file.temporary().c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC));
     if (descriptor.get() < 0) fail(path, "cannot open", errno);
     PieceWriter writer(descriptor.get());
@@ -289,7 +321,43 @@ void write_pieces_atomically(const std::filesystem::path& path,
     fill([&](std::string_view piece) { check(writer.append(piece)); });
     check(writer.flush());
     if (descriptor.close() != 0) fail(path, "cannot write", errno);
+}
+
+// `file` is open.
+void append_pieces_of(const Descriptor& file, const std::filesystem::path& path, const AppendPiece& append) {
+    std::vector<char> piece(std::size_t(256) << 10);
+    for (;;) {
+        const ssize_t count = ::read(file.get(), piece.data(), piece.size());
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) throw ReadFailure(path, std::strerror(errno));
+        if (count == 0) return;
+        append({piece.data(), std::size_t(count)});
+    }
+}
+
+bool write_pieces_where_free(const std::filesystem::path& path, const FillPieces& fill) {
+    if (stands_there(path)) return false;  // of which the new one would take its permissions
+    AtomicFile file(path);
+    write_pieces(file, path, fill);
+    return file.publish_where_free();
+}
+
+}  // namespace
+
+void write_pieces_atomically(const std::filesystem::path& path, const FillPieces& fill, Folders folders) {
+    AtomicFile file(path, Access::shared, folders);
+    write_pieces(file, path, fill);
     file.publish();
+}
+
+bool write_where_free(const std::filesystem::path& path, std::string_view content) {
+    return write_pieces_where_free(path, [&](const AppendPiece& append) { append(content); });
+}
+
+bool copy_where_free(const std::filesystem::path& from, const std::filesystem::path& to) {
+    const Descriptor file = open_regular_file(from, O_RDONLY);
+    return write_pieces_where_free(to,
+                                   [&](const AppendPiece& append) { append_pieces_of(file, from, append); });
 }
 
 void write_atomically(const std::filesystem::path& path, std::string_view content) {
@@ -302,16 +370,7 @@ void write_atomically(const std::filesystem::path& path, std::span<const std::by
 
 void copy_atomically(const std::filesystem::path& from, const std::filesystem::path& to) {
     const Descriptor file = open_regular_file(from, O_RDONLY);
-    std::vector<char> piece(std::size_t(256) << 10);
-    write_pieces_atomically(to, [&](const AppendPiece& append) {
-        for (;;) {
-            const ssize_t count = ::read(file.get(), piece.data(), piece.size());
-            if (count < 0 && errno == EINTR) continue;
-            if (count < 0) throw ReadFailure(from, std::strerror(errno));
-            if (count == 0) return;
-            append({piece.data(), std::size_t(count)});
-        }
-    });
+    write_pieces_atomically(to, [&](const AppendPiece& append) { append_pieces_of(file, from, append); });
 }
 
 bool separate_from_links(const std::filesystem::path& path) {

@@ -49,6 +49,8 @@ class AtomicFile {
     // Flushes the temporary file to the device and renames it to its path. Throws Error(io) naming the path, also
     // when another file or a link was put in the place of the temporary one.
     void publish();
+    // As publish(), but where nothing stands at its path. Returns whether it was renamed.
+    bool publish_where_free();
 
   private:
     void open_folder(const std::filesystem::path& folder);
@@ -56,6 +58,8 @@ class AtomicFile {
     void take_permissions(int fd);
     bool is_created_file(const struct stat& status) const;
     int open_again() const;
+    void flush() const;
+    void flush_folder() const;
     void remove() const;
 
     std::filesystem::path path_, temporary_;
@@ -96,6 +100,14 @@ using AppendPiece = std::function<void(std::string_view piece)>;
 void write_pieces_atomically(const std::filesystem::path& path,
                              const std::function<void(const AppendPiece& append)>& fill,
                              Folders folders = Folders::made);
+
+// Write and copy a file where nothing stands at its path, also no link. Return false where something does. Errors as above.
+bool write_where_free(const std::filesystem::path& path, std::string_view content);
+bool copy_where_free(const std::filesystem::path& from, const std::filesystem::path& to);
+
+// Renames a file in an open folder to where nothing stands in another one. Returns 0 or errno, EEXIST where something does. On a
+// file system that cannot do both at once, as some network ones, there are microseconds in between.
+int rename_where_free(int from_folder, const std::string& from, int to_folder, const std::string& to);
 
 // Copies a regular file piece by piece. Errors as above, and as open_regular_file() for `from`.
 void copy_atomically(const std::filesystem::path& from, const std::filesystem::path& to);

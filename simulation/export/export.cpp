@@ -231,7 +231,7 @@ void write_text_file(ExportList& list, const std::string& name, std::span<const 
         name, {}, {}, [&](const std::filesystem::path& path) { write_atomically(path, content); }));
 }
 
-// Throws Error(io) unless a folder still holds the run that was read of it; it may have more frames by now.
+// Throws Error(io) unless a folder still holds the run that was read of it, of which more frames may be there by now.
 void require_same_run(const RunListing& run, const std::filesystem::path& source) {
     const RunListing now = read_run(source);
     const auto is_same_frame = [](const ListedFrame& a, const ListedFrame& b) {
@@ -249,9 +249,12 @@ void write_weather(const ExportOptions& options, const RunListing& run,
                    const std::vector<ExportSequence>& sequences, ExportList& list,
                    std::vector<std::string>& notes) {
     std::vector<WeatherSummary> frames;
+    std::vector<std::string> damages;
     for (const ListedFrame& frame : run.frames) {
-        if (is_wanted(options, frame.number, 1)) frames.push_back(summarise(run, frame));
+        if (is_wanted(options, frame.number, 1)) frames.push_back(summarise(run, frame, damages));
     }
+    for (std::string& damage : damages)  // those of volumes were told
+        if (std::ranges::count(notes, damage) == 0) notes.push_back(std::move(damage));
     // Its files were opened by their paths, those of volumes before: a folder or link of that name may lead to another run by now.
     require_same_run(run, options.source);
     for (const ExportSequence& s : sequences)

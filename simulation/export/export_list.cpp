@@ -189,7 +189,6 @@ void ExportList::require_free(const std::vector<std::string>& names) const {
 }
 
 void ExportList::begin() {
-    if (!has_list_ && stands_there(folder_ / "export.json")) throw_place_taken(folder_ / "export.json");
     write(false);
     has_list_ = true;
     work_.begin();
@@ -244,9 +243,13 @@ void ExportList::add_written(ExportedFile file) {
 }
 
 std::string ExportList::below_folder(const std::filesystem::path& source) const {
+    if (source.empty()) return {};
     std::error_code error;
-    return source.empty() ? std::string()
-                          : std::filesystem::proximate(source, folder_, error).generic_string();
+    std::filesystem::path path = std::filesystem::proximate(source, folder_, error);
+    if (error) path = std::filesystem::absolute(source, error);
+    if (error)
+        throw Error(ErrorCode::io, source.string() + ": its whole path is not known: " + error.message());
+    return path.generic_string();
 }
 
 void ExportList::write(bool complete) const {
@@ -264,10 +267,14 @@ void ExportList::write(bool complete) const {
         for (const auto& [name, file] : earlier_) add(name, file);
     }
     json["files"] = std::move(files);
+    const std::string text = sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace));
     const std::function<void()> check = [this] { lock_.require_in_place(); };
     const PublishCheck keeps_in_place(check);
-    write_atomically(folder_ / "export.json",
-                     std::string_view(sealed_text(json.dump(2, ' ', false, Json::error_handler_t::replace))));
+    const std::filesystem::path path = folder_ / "export.json";
+    if (has_list_)
+        write_atomically(path, std::string_view(text));
+    else if (!write_where_free(path, text))
+        throw_place_taken(path);
 }
 
 // Throws Error(io) where one was removed or replaced by another meanwhile.

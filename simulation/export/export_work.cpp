@@ -47,17 +47,6 @@ bool is_of_export(const std::filesystem::path& work, const std::vector<std::stri
                     "choose another folder");
 }
 
-// Renames a file where nothing stands. Returns 0 or errno.
-int rename_to_free_place(int from_folder, const std::string& from, int to_folder, const std::string& to) {
-    if (::renameat2(from_folder, from.c_str(), to_folder, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
-    if (errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP) return errno;
-    // A file system that cannot, as some network ones.
-    struct stat status {};
-    if (::fstatat(to_folder, to.c_str(), &status, AT_SYMLINK_NOFOLLOW) == 0) return EEXIST;
-    if (errno != ENOENT) return errno;
-    return ::renameat(from_folder, from.c_str(), to_folder, to.c_str()) == 0 ? 0 : errno;
-}
-
 // Returns the text of an error, in which files of the one folder are called by their path in the other.
 std::string renamed(std::string text, const std::string& from, const std::string& to) {
     for (std::size_t at = text.find(from); at != text.npos; at = text.find(from, at + to.size()))
@@ -207,7 +196,7 @@ void ExportWork::note(const ExportedFile& file) {
 }
 
 void ExportWork::place(const std::string& name) {
-    const int error = rename_to_free_place(work_.get(), name, lock_.descriptor(), name);
+    const int error = rename_where_free(work_.get(), name, lock_.descriptor(), name);
     if (error == EXDEV) copy_to_free_place(name);  // some unions of file systems rename within a folder alone
     if (error != 0) ::unlinkat(work_.get(), name.c_str(), 0);
     if (error == 0 || error == EXDEV) return;
@@ -216,21 +205,11 @@ void ExportWork::place(const std::string& name) {
 }
 
 void ExportWork::copy_to_free_place(const std::string& name) const {
-    const std::filesystem::path place = folder_ / name;
-    if (stands_there(place)) throw_place_taken(place);
-    const AtomicFile copy(place);  // removes its file where that gets no place
-    std::error_code failed;
-    std::filesystem::copy_file(held_path_of(name), copy.temporary(),
-                               std::filesystem::copy_options::overwrite_existing, failed);
-    if (failed) fail(place, "cannot write", failed.value());
-    const Descriptor written = open_regular_file(copy.temporary(), O_RDONLY);
-    if (const int unflushed = flush_to_device(written.get()); unflushed != 0 && unflushed != EINVAL)
-        fail(place, "cannot flush to the device", unflushed);
-    require_in_place();
-    const int error = rename_to_free_place(lock_.descriptor(), copy.temporary().filename().string(),
-                                           lock_.descriptor(), name);
-    if (error == EEXIST) throw_place_taken(place);
-    if (error != 0) fail(place, "cannot rename into place", error);
+    const std::function<void()> check = [this] { require_in_place(); };
+    const PublishCheck keeps_in_place(check);
+    bool is_free = false;
+    write(name, [&](const std::filesystem::path& held) { is_free = copy_where_free(held, folder_ / name); });
+    if (!is_free) throw_place_taken(folder_ / name);
 }
 
 void ExportWork::require_in_place() const {

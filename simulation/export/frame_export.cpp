@@ -134,10 +134,8 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
     require_unchanged(frame);
     Encodings made;
     ExportedFrame result{{loaded.density.sum(), double(loaded.density.max_value())}, {}, {}};
-    if (frame.listed && frame.listed != source.digest)
-        result.notes.push_back(frame.file.string() +
-                               ": is damaged or was changed: it is not the file that the manifest of its run "
-                               "lists (nephos verify compares all of them)");
+    if (std::string note = damage_note(frame, *source.digest); !note.empty())
+        result.notes.push_back(std::move(note));
     for (const ExportFormat format : all_formats(options_)) {
         if (format == ExportFormat::usd) continue;
         const std::string name = frame_name(s, frame.number, format);

@@ -99,9 +99,8 @@ ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& r
     const bool is_plain = !density.half && !density.write_state && !density.write_velocity;
     for (const ListedFrame& frame : run.frames) {
         if (!is_wanted(options, frame.number, 1)) continue;
-        const std::filesystem::path file = density_file(run, frame, layer);
-        s.frames.push_back({file, frame.number, frame.time_s, utc_at(run.scene.georeference, frame.time_s),
-                            file_stamp(file), listed_digest(run, frame, file), is_plain});
+        s.frames.push_back(frame_of_run(run, frame, layer));
+        s.frames.back().is_plain = is_plain;
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, run.folder.string() + ": has no frame of this range");
     read_first(options, s);
@@ -339,6 +338,26 @@ std::vector<WeatherFormat> all_weather(const ExportOptions& options) {
     std::sort(formats.begin(), formats.end());
     formats.erase(std::unique(formats.begin(), formats.end()), formats.end());
     return formats;
+}
+
+SourceFrame frame_of_run(const RunListing& run, const ListedFrame& frame,
+                         const std::optional<std::string>& layer) {
+    SourceFrame source;
+    source.file = density_file(run, frame, layer);
+    source.number = frame.number;
+    source.time_s = frame.time_s;
+    source.utc = utc_at(run.scene.georeference, frame.time_s);
+    source.stamp = file_stamp(source.file);
+    source.listed = listed_digest(run, frame, source.file);
+    return source;
+}
+
+std::string damage_note(const SourceFrame& frame, const FileDigest& read) {
+    if (!frame.listed || *frame.listed == read) return {};
+    return frame.file.string() +
+           ": is damaged or was changed: it is not the file that the manifest of its run lists (nephos "
+           "verify "
+           "compares all of them)";
 }
 
 void require_unchanged(const SourceFrame& frame) {

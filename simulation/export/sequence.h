@@ -19,6 +19,9 @@
 
 namespace nephos {
 
+struct ListedFrame;
+struct RunListing;
+
 struct SourceFrame {
     std::filesystem::path file;
     int number = 1;
@@ -72,6 +75,14 @@ std::uint64_t dense_bytes(const ExportOptions& options, const ExportSequence& se
 std::vector<ExportFormat> all_formats(const ExportOptions& options);
 // Returns the summaries of weather, each once.
 std::vector<WeatherFormat> all_weather(const ExportOptions& options);
+
+// Returns a frame of a run, of a layer or of all together, with what its manifest says of the file. Throws as density_file();
+// Error(io) where there is no such file.
+SourceFrame frame_of_run(const RunListing& run, const ListedFrame& frame,
+                         const std::optional<std::string>& layer);
+
+// Returns a sentence where what was read of a run's file is not what its manifest lists, else "".
+std::string damage_note(const SourceFrame& frame, const FileDigest& read);
 
 // Returns whether a frame is to be exported; the source begins with the number `least`.
 bool is_wanted(const ExportOptions& options, int number, int least);

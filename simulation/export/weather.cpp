@@ -14,6 +14,7 @@
 #include "scenes/metar/metar.h"
 #include "scenes/metar/metar_scene.h"
 #include "seeds/genera.h"
+#include "simulation/export/sequence.h"
 #include "simulation/scene_place.h"
 
 namespace nephos {
@@ -96,7 +97,22 @@ double bearing_from(const Velocity& v, double heading_deg) {
     return degrees - 360 * std::floor(degrees / 360);
 }
 
-WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
+namespace {
+
+// Reads a density file as the manifest lists it; notes that it is not.
+DensityGrid listed_density(const RunListing& run, const ListedFrame& frame,
+                           const std::optional<std::string>& layer, std::vector<std::string>& notes) {
+    const SourceFrame source = frame_of_run(run, frame, layer);
+    DensityGrid density = read_density(source.file);
+    if (std::string note = damage_note(source, file_digest(source.file)); !note.empty())
+        notes.push_back(std::move(note));
+    require_unchanged(source);
+    return density;
+}
+
+}  // namespace
+
+WeatherSummary summarise(const RunListing& run, const ListedFrame& frame, std::vector<std::string>& notes) {
     const Scene& scene = run.scene;
     WeatherSummary w;
     w.number = frame.number;
@@ -109,14 +125,14 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
     // Fresh snow has a tenth of the density of water.
     if (scene.ground_cover.enabled) w.snow_depth_m = scene.ground_cover.initial_snow_mm / 100;
     if (scene.layers.empty()) {
-        w.layers.push_back(summary_of(run, scene.name, read_density(density_file(run, frame, {})),
+        w.layers.push_back(summary_of(run, scene.name, listed_density(run, frame, {}, notes),
                                       scene.automaton.wind, frame.time_s));
     }
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
         if (!has_density(scene.layers[n])) continue;
-        LayerSummary s = summary_of(run, scene.layers[n].name,
-                                    read_density(density_file(run, frame, scene.layers[n].name)),
-                                    layer_wind(scene, n), frame.time_s);
+        LayerSummary s =
+            summary_of(run, scene.layers[n].name, listed_density(run, frame, scene.layers[n].name, notes),
+                       layer_wind(scene, n), frame.time_s);
         s.genus = genus_of(scene, scene.layers[n]);
         s.towering = s.genus == "Cu" && s.columns.top_m - s.columns.cloud_base_m > kTowering_m;
         for (const RainRecord& area : frame.rain)

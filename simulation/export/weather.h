@@ -48,8 +48,9 @@ struct WeatherSummary {
     double snow_depth_m = 0;              // on the ground
 };
 
-// Reads the density files of a frame: of its layers, or the only one. Throws Error(io) as load_density().
-WeatherSummary summarise(const RunListing& run, const ListedFrame& frame);
+// Reads the density files of a frame: of its layers, or the only one; adds a note for each that is not as the run's manifest
+// lists it. Throws Error(io) as load_density(), and where one changes meanwhile.
+WeatherSummary summarise(const RunListing& run, const ListedFrame& frame, std::vector<std::string>& notes);
 
 // Return the report of a summary, its station the scene's name if that is four capital letters, else ZZZZ; the element
 // of one frame for layers.json; X-Plane's XPLMWeatherInfo_t as JSON; MSFS's weather preset.

@@ -578,6 +578,21 @@ class Export(Case):
             self.assertIn("placed_0003.vdb: is damaged or was changed", said)
         path.write_bytes(whole)
 
+    def test_weather_of_a_file_that_the_manifest_does_not_list(self):
+        """The clouds of a layer are those of another frame, as in the midst of a copy: named once, also beside volumes of the same file."""
+        self.call("run", self.write("layered.toml", LAYERED.replace("steps = 2", "steps = 4")), "--no-render", "--out", "run", "--overwrite")
+        files = sorted((self.folder / "run/density/low").iterdir())
+        files[1].write_bytes(files[2].read_bytes())
+        wrong = f"{files[1].relative_to(self.folder)}: is damaged or was changed"
+        for formats in (["--to", "layers", "--to", "metar"], ["--to", "metar", "--to", "raw", "--layer", "low"]):
+            said = self.call("export", "run", *formats, "-o", "out").stderr
+            self.assertEqual(said.count(wrong), 1, said)
+            said = self.call("export", "run", *formats, "--frames", "3..4", "-o", "other").stderr
+            self.assertNotIn("is damaged", said)
+            for name in ("out", "other"):
+                self.call("verify", name)
+                shutil.rmtree(self.folder / name)
+
     def test_one_export_at_a_time(self):
         import fcntl
         folder = self.export("out", "--to", "raw")

@@ -275,12 +275,15 @@ class InterruptedExport(Case):
 
     def test_a_list_put_there_meanwhile_stays(self):
         """Where an export has looked for one, and not written its own yet."""
-        process = self.stopped("stat STOP 1 1", "out/placed_0001", "export", "run", "--to", "raw", "-o", "out")
-        (self.folder / "out/export.json").write_text("mine")
-        process.send_signal(signal.SIGCONT)
-        error = process.communicate(timeout=60)[1]
-        self.assertEqual((process.returncode, (self.folder / "out/export.json").read_text()), (2, "mine"), error)
-        self.assertIn("export.json: is there already", error)
+        for stop, path in (("stat STOP 1 1", "out/placed_0001"), ("fsync STOP 1 1", "out/.export")):
+            process = self.stopped(stop, path, "export", "run", "--to", "raw", "-o", "out")
+            (self.folder / "out/export.json").write_text("mine")
+            process.send_signal(signal.SIGCONT)
+            error = process.communicate(timeout=60)[1]
+            self.assertEqual((process.returncode, (self.folder / "out/export.json").read_text()), (2, "mine"), error)
+            self.assertIn("export.json: is there already", error)
+            self.assertEqual([path.name for path in (self.folder / "out").iterdir()], ["export.json"])
+            shutil.rmtree(self.folder / "out")
 
     def test_weather_of_a_run_that_is_exchanged(self):
         """A link that leads to another run by now, also to one without the frames asked for: refused; with the first one again it goes on."""
