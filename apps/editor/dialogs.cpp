@@ -56,8 +56,9 @@ bool accept(Editor& editor, const fs::path& path) {
                 return true;
             case FileDialog::save_as:
                 for_each_scene(editor, [&](const OpenScene& open) {
-                    if (const Scene* const scene = open.document->current_scene())
-                        refuse_to_replace_files_of(*scene, path);
+                    const Scene* const scene = open.document->current_scene();
+                    const bool saves_there = editor.document->has_file() && path == editor.document->path();
+                    if (scene != nullptr && !saves_there) refuse_to_replace_files_of(*scene, path);
                 });
                 editor.document->save_as(path);
                 note_recent(editor.settings, path);
@@ -291,13 +292,15 @@ void ask_before(Editor& editor, Pending what, fs::path path) {
     // Leaves the scene that is shown to what is asked of it: dialogs() goes on with the end of the program.
     const bool is_asked =
         editor.question || editor.dialog != FileDialog::none || !editor.left_autosaves.empty();
-    if (what == Pending::close && is_asked && is_anything_unsaved(editor)) return;
+    editor.is_put_off = what == Pending::close && is_asked && is_anything_unsaved(editor);
+    if (editor.is_put_off) return;
     const bool replaces = !beside && !is_grid(editor.pending_path);
     if (!replaces || !editor.document->is_modified()) do_pending(editor);
 }
 
 void forget_pending(Editor& editor) {
     editor.pending = Pending::none;
+    editor.is_put_off = false;
     editor.opens_beside = false;
     for_each_scene(editor, [](OpenScene& scene) { scene.is_answered = false; });
 }
@@ -364,18 +367,18 @@ void do_pending(Editor& editor) {
 }
 
 void dialogs(Editor& editor) {
-    // One at a time, what was asked last first: popups that open beside each other close each other. The window's own cross may ask
-    // while another one is open.
+    // One at a time, what was asked last first: popups that open beside each other close each other. The window's
+    // own cross may ask while another one is open.
     if (editor.question)
         question_dialog(editor);
     else if (editor.dialog != FileDialog::none)
         file_dialog(editor);
     else if (!editor.left_autosaves.empty())
         recovery_dialog(editor);
-    else if (editor.pending != Pending::none && editor.document->is_modified())
-        unsaved_dialog(editor);
-    else if (editor.pending != Pending::none)
+    else if (std::exchange(editor.is_put_off, false) && !editor.document->is_modified())
         do_pending(editor);
+    else if (editor.pending != Pending::none)
+        unsaved_dialog(editor);  // until it is answered, whatever becomes of the file meanwhile
     run_window(editor);
     generation_window(editor);
     shortcuts_window(editor);

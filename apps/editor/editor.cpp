@@ -23,7 +23,7 @@ namespace {
 
 using Clock = Report::Clock;
 
-constexpr double kFrameSeconds = 1.0 / 60, kIdleSeconds = 0.1;
+constexpr double kFrameSeconds = 1.0 / 60, kIdleSeconds = 0.1, kCapturePatience_s = 10;
 constexpr std::chrono::milliseconds kRowsAlone{200};
 
 // Before a scene is drawn: where the camera of the one before stands there may be ground.
@@ -198,8 +198,12 @@ void shortcuts(Editor& editor) {
     }
 }
 
+// Returns whether a picture of the window is due: a frame may have none, as while another program changes the window's size.
+bool awaits_capture(const Editor& editor) {
+    return !editor.capture_to.empty() && !editor.window->is_minimised();
+}
+
 void save_capture(Editor& editor) {
-    if (editor.capture_to.empty()) return;
     const WindowImage& image = editor.window->captured();
     const std::filesystem::path path = std::exchange(editor.capture_to, {});
     const bool by_user = std::exchange(editor.capture_by_user, false);
@@ -242,7 +246,7 @@ int loop(Editor& editor, Report& report) {
     Script script = editor.options.script.empty() ? Script() : Script(editor.options.script);
     const bool scripted = !editor.options.script.empty();
     std::string title;
-    Clock::time_point last_frame = Clock::now(), last_input = Clock::now(), last_results;
+    Clock::time_point last_frame = Clock::now(), last_input = Clock::now(), last_captured, last_results;
     bool screenshot_due = !editor.options.screenshot.empty();
     std::vector<std::filesystem::path> dropped;
     while (!editor.quit) {
@@ -272,7 +276,7 @@ int loop(Editor& editor, Report& report) {
         }
         const double interval = seconds_since(last_frame);
         last_frame = Clock::now();
-        if (scripted && script.is_active()) script.apply(editor);
+        if (scripted && script.is_active() && !awaits_capture(editor)) script.apply(editor);
         for (std::filesystem::path& path : editor.window->take_dropped()) dropped.push_back(std::move(path));
         if (!dropped.empty() && !press_enter_in_field()) {  // likewise
             const std::vector<std::filesystem::path> paths = std::exchange(dropped, {});
@@ -301,17 +305,24 @@ int loop(Editor& editor, Report& report) {
         if (screenshot_due && seconds_since(report.begin) > editor.options.after_s && whole &&
             !script.is_active()) {
             editor.capture_to = editor.options.screenshot;
-            editor.quit = true;
             screenshot_due = false;
         }
         if (!editor.capture_to.empty()) editor.window->capture_next();
         editor.window->end_frame();
-        if (!editor.capture_to.empty() && !editor.window->is_minimised()) save_capture(editor);
+        if (!awaits_capture(editor)) {
+            last_captured = Clock::now();
+        } else if (editor.window->is_captured()) {
+            save_capture(editor);
+        } else if (seconds_since(last_captured) > kCapturePatience_s) {
+            throw Error(ErrorCode::gpu, fmt::format("{}: the window showed no picture for {} seconds",
+                                                    editor.capture_to.string(), kCapturePatience_s));
+        }
         if (report.frames++ == 0) report.first_frame_s = seconds_since(report.begin);
         const double spent = seconds_since(last_frame);
         if (report.frames > 3) report.longest_frame_s = std::max(report.longest_frame_s, spent);
         if (report.frames > 3 && busy) report.intervals.push_back(interval);
-        if (scripted && !script.is_active() && editor.options.screenshot.empty()) editor.quit = true;
+        const bool is_last = editor.options.screenshot.empty() ? scripted : !screenshot_due;
+        if (is_last && !script.is_active() && !awaits_capture(editor)) editor.quit = true;
     }
     return 0;
 }

@@ -272,9 +272,12 @@ void view_options_panel(Editor& editor) {
         "probabilities of its field, from blue to red for the largest in the slice");
     if (editor.slice_of >= SliceOf::p_hum) ImGui::TextDisabled("red: %.4g per step", editor.slice_most);
     if (editor.slice_of != SliceOf::nothing && editor.slice_cells > 0) {
+        // That of a higher layer stays, for when that one is shown again.
+        int shown = std::min(editor.slice, editor.slice_cells - 1);
         ImGui::SetNextItemWidth(-1);
-        ImGui::SliderInt("##slice", &editor.slice, 0, editor.slice_cells - 1, "cell %d from below",
-                         ImGuiSliderFlags_AlwaysClamp);
+        if (ImGui::SliderInt("##slice", &shown, 0, editor.slice_cells - 1, "cell %d from below",
+                             ImGuiSliderFlags_AlwaysClamp))
+            editor.slice = shown;
         editor.controls.note("slice");
     }
     toggle(editor, "Plots below the time line", editor.show_plots);

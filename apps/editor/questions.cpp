@@ -58,7 +58,9 @@ void unsaved_dialog(Editor& editor) {
                                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
         return;
     ImGui::Text(editor.document->is_gone() ? "The file of %s is gone from the disk."
-                                           : "%s has edits that are not saved.",
+                : editor.document->is_modified()
+                    ? "%s has edits that are not saved."
+                    : "The file of %s is there again. Undo has what was here before.",
                 editor.document->title().c_str());
     editor.controls.note("unsaved " + editor.document->title());
     ImGui::Spacing();

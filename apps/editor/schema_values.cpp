@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <limits>
 #include <utility>
 
 #include "core/error.h"
@@ -66,9 +67,11 @@ std::string readable_name(std::string_view name) {
     return out;
 }
 
-// Returns true for a key that rises from one key frame, climate or level to the next.
+// Returns true for a key that has to rise from one key frame, level or presence of a veil to the next.
 bool rises_from_item_to_item(const Key& tables, const Key& key) {
-    return key.name == "time_s" || key.name == "state" || (tables.name == "levels" && key.name == "height_m");
+    return (key.name == "time_s" && tables.name != "lightning") ||
+           (key.name == "height_m" && tables.name == "levels") ||
+           (key.name == "state" && tables.name == "presence");
 }
 
 std::string readable_name(const Key& key) {
@@ -216,14 +219,19 @@ double step_of(const Key& key) {
     return key.name == "height_m" ? 500 : 600;
 }
 
+// Returns the text of a value in nine digits, or in all that it takes to stay between two others.
+std::string readable_between(double low, double value, double high) {
+    const std::string text = number_text(value, 9);
+    double rounded = value;
+    std::from_chars(text.data(), text.data() + text.size(), rounded);
+    return low < rounded && rounded < high ? text : number_text(value);
+}
+
 }  // namespace
 
 std::optional<TextEntry> place_of_copy(const Key& tables, const Node& array, std::size_t index) {
     for (const Key& key : tables.section->keys) {
-        const bool rises = (key.name == "time_s" && tables.name != "lightning") ||
-                           (key.name == "height_m" && tables.name == "levels") ||
-                           (key.name == "state" && tables.name == "presence");
-        if (!rises) continue;
+        if (!rises_from_item_to_item(tables, key)) continue;
         const double here = number_in(array.items.at(index), key.name);
         const double next = index + 1 < array.items.size()
                                 ? number_in(array.items[index + 1], key.name)
@@ -232,10 +240,7 @@ std::optional<TextEntry> place_of_copy(const Key& tables, const Node& array, std
         if (!(here < middle && middle < next))
             throw Error(ErrorCode::usage,
                         "Not copied: no " + std::string(key.name) + " is left behind " + number_text(here));
-        const std::string text = number_text(middle, 9);
-        double rounded = middle;
-        std::from_chars(text.data(), text.data() + text.size(), rounded);
-        return TextEntry{key.name, here < rounded && rounded < next ? text : number_text(middle)};
+        return TextEntry{key.name, readable_between(here, middle, next)};
     }
     return std::nullopt;
 }
@@ -248,8 +253,9 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
         const bool layer_skies = tables.name == "layer" && key.name == "skies";
         const bool sky_models = tables.name == "sky" && (key.name == "models" || key.name == "clouds");
         const bool base = tables.name == "layer" && key.name == "base_height_m";
-        const bool rises =
-            key.kind == KeyKind::number && rises_from_item_to_item(tables, key) && array != nullptr;
+        // No two skies have one state; the points of a schedule may.
+        const bool rises = key.kind == KeyKind::number && array != nullptr &&
+                           (rises_from_item_to_item(tables, key) || key.name == "state");
         const bool next = rises && !array->items.empty();  // it may not be the value of the item before
         if (!key.required && !layer_skies && !sky_models && !base && !next) continue;
         std::string value;
@@ -281,7 +287,8 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
         } else if (rises) {
             double last = 0;
             for (const Node& item : array->items) last = std::max(last, number_in(item, key.name));
-            value = number_text(array->items.empty() ? 0 : std::min(last + step_of(key), key.limits.max), 6);
+            const double place = array->items.empty() ? 0 : std::min(last + step_of(key), key.limits.max);
+            value = readable_between(last, place, std::numeric_limits<double>::infinity());
         } else if (key.name == "position_m" && tables.section->find("target_m") != nullptr) {
             value = default_of_kind(key, {centre_m.x, centre_m.y - 4000, std::max(2.0, centre_m.z - 500)});
         } else {

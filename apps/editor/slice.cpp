@@ -76,7 +76,7 @@ void slice_over_picture(Editor& editor) {
     if (!shown) return;
     const Extent& cells = shown->cld.extent;
     editor.slice_cells = cells.z;
-    const int k = editor.slice = std::clamp(editor.slice, 0, cells.z - 1);
+    const int k = std::clamp(editor.slice, 0, cells.z - 1);
     int stride = 1;
     while ((cells.x / stride) * (cells.y / stride) > kMostCells) ++stride;
     const Vec3& origin = shown->placement.origin_m;

@@ -197,6 +197,7 @@ struct Editor : OpenScene {
     std::future<FilePreview> coming_preview;
     std::optional<Question> question;
     Pending pending = Pending::none;
+    bool is_put_off = false;    // until what was asked before is answered
     bool opens_beside = false;  // what is opened is one more scene
     bool show_shortcuts = false, show_about = false, show_run = false;
     std::vector<std::filesystem::path> folder_scenes;

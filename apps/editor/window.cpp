@@ -353,6 +353,7 @@ void Window::place_picture(const ImVec2& min, const ImVec2& max) {
 }
 
 void Window::capture_next() { impl_->captures = true; }
+bool Window::is_captured() const { return !impl_->captures; }
 const WindowImage& Window::captured() const { return impl_->image; }
 
 void Window::rebuild_fonts() { impl_->fonts_loaded = false; }

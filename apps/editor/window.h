@@ -59,8 +59,9 @@ class Window {
     // Where it shows, scaled, in this frame and later ones; ImGui's coordinates.
     void place_picture(const ImVec2& min, const ImVec2& max);
 
-    // Copies what the next end_frame() shows.
+    // Copies what the next end_frame() shows that has a picture to show.
     void capture_next();
+    bool is_captured() const;
     const WindowImage& captured() const;
 
     // Replaces the fonts; between two frames.

@@ -4,7 +4,9 @@
 // each further one fails with VK_ERROR_DEVICE_LOST. So do waits for fences after NEPHOS_LOSE_WAIT_AFTER of
 // them, counted while that variable is there; what they wait for is done all the same. Submissions fail also from the
 // moment on when the file NEPHOS_LOSE_DEVICE_WHEN is there. After NEPHOS_REFUSE_MEMORY_AFTER allocations of memory, counted
-// while that variable is there, each further one fails with VK_ERROR_OUT_OF_DEVICE_MEMORY. For one instance and one device in one thread at a time.
+// while that variable is there, each further one fails with VK_ERROR_OUT_OF_DEVICE_MEMORY. With NEPHOS_SHOW_EVERY a window gets
+// an image only each so many times that it asks for one, with 0 never; the other times VK_ERROR_OUT_OF_DATE_KHR, as while its size
+// changes. For one instance and one device in one thread at a time.
 
 #include <atomic>
 #include <cstdlib>
@@ -23,7 +25,8 @@ PFN_vkQueueSubmit2 next_submit = nullptr;
 PFN_vkQueueSubmit next_old_submit = nullptr;
 PFN_vkWaitForFences next_wait = nullptr;
 PFN_vkAllocateMemory next_allocate = nullptr;
-std::atomic<long> submissions{0}, waits{0}, allocations{0};
+PFN_vkAcquireNextImageKHR next_acquire = nullptr;
+std::atomic<long> submissions{0}, waits{0}, allocations{0}, images{0};
 
 // What the loader hands to a layer in the chain of a create info.
 template <typename Link, typename CreateInfo>
@@ -71,6 +74,14 @@ VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice device, const VkMemoryAllocateI
     return next_allocate(device, info, allocator, memory);
 }
 
+VKAPI_ATTR VkResult VKAPI_CALL acquire(VkDevice device, VkSwapchainKHR chain, std::uint64_t timeout,
+                                       VkSemaphore semaphore, VkFence fence, std::uint32_t* index) {
+    const char* given = std::getenv("NEPHOS_SHOW_EVERY");
+    const long every = given != nullptr ? std::atol(given) : 1;
+    if (every == 0 || images++ % every != 0) return VK_ERROR_OUT_OF_DATE_KHR;
+    return next_acquire(device, chain, timeout, semaphore, fence, index);
+}
+
 VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo* info,
                                                const VkAllocationCallbacks* allocator, VkInstance* instance) {
     auto* link = link_of<VkLayerInstanceCreateInfo>(info, VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO);
@@ -99,6 +110,8 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const Vk
     next_old_submit = reinterpret_cast<PFN_vkQueueSubmit>(next_of_device(*device, "vkQueueSubmit"));
     next_wait = reinterpret_cast<PFN_vkWaitForFences>(next_of_device(*device, "vkWaitForFences"));
     next_allocate = reinterpret_cast<PFN_vkAllocateMemory>(next_of_device(*device, "vkAllocateMemory"));
+    next_acquire =
+        reinterpret_cast<PFN_vkAcquireNextImageKHR>(next_of_device(*device, "vkAcquireNextImageKHR"));
     return result;
 }
 
@@ -109,6 +122,8 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL device_function(VkDevice device, const 
     if (std::strcmp(name, "vkQueueSubmit") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&old_submit);
     if (std::strcmp(name, "vkWaitForFences") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&wait);
     if (std::strcmp(name, "vkAllocateMemory") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&allocate);
+    if (std::strcmp(name, "vkAcquireNextImageKHR") == 0)
+        return reinterpret_cast<PFN_vkVoidFunction>(&acquire);
     return next_of_device(device, name);
 }
 

@@ -155,6 +155,40 @@ class Window(Case):
                     for image in (a, b)]
         self.assertGreater(reds[1], reds[0] + 200)
 
+    def test_slice_of_layers_of_different_heights(self):
+        """A low layer shows the highest cells that it has; the slice of the high one is where it was."""
+        scene = self.folder / "heights.toml"
+        scene.write_text('seed = 4\n[time]\nstep_s = 2\nsteps = 9\n[[model]]\nname = "a"\nseeds = [{ position_m = [0, 0, 200], size_m = [300, 200, 150] }]\n'
+                         '[[sky]]\nname = "fair"\nstate = 0\nclouds = 8\nmodels = ["a"]\n' +
+                         "".join(f'[[layer]]\nname = "{name}"\nskies = ["fair"]\nbase_height_m = {base}\nlattice = {{ cells = [16, 16, {cells}] }}\n'
+                                 for name, base, cells in (("low", 200, 6), ("high", 900, 24))), encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait-step 3
+            key SPACE
+            wait-picture
+            click layer
+            click layer[1]
+            click tab View
+            click slice of
+            click choice bits
+            wait 0.5
+            click-at slice 0.75 0.5
+            wait 0.5
+            screenshot high.png
+            click layer[0]
+            click tab View
+            wait 0.5
+            screenshot low.png
+            click layer[1]
+            click tab View
+            wait 0.5
+            screenshot again.png
+            """)
+        slider = (890, 560, 1265, 585)
+        high, low, again = (self.image(name, slider) for name in ("high.png", "low.png", "again.png"))
+        self.assertNotEqual(high.tobytes(), low.tobytes())
+        self.assertEqual(high.tobytes(), again.tobytes())
+
     def test_handles_hodograph_and_key_frames(self):
         """Drags what can be dragged: a seed along an axis, its root's direction and opening, a point of the hodograph, a
         rain area's size, a key frame on the time line; the saved scene has what the mouse did, and nothing else."""
@@ -729,6 +763,21 @@ class Failures(Case):
             if done.returncode == 4:
                 self.assertIn("the graphics device failed", done.stderr)
         self.assertGreater(failures, 3)
+
+    def test_pictures_while_the_window_shows_none(self):
+        """They wait for the next frame that it shows; where none comes the editor says so."""
+        scene = self.scene("cumulus-by-hand.toml")
+        layer = {"VK_LAYER_PATH": os.environ["LAYERS"], "VK_INSTANCE_LAYERS": "VK_LAYER_NEPHOS_lost_device"}
+        script = "wait-step 1\nkey SPACE\nclick scene\n" + "".join(f"set seed {seed}\nwait 0.2\nscreenshot {seed}.png\n" for seed in range(100, 108))
+        self.edit(scene, script=script, environment={**layer, "NEPHOS_SHOW_EVERY": "3"})
+        pictures = {(self.folder / f"{seed}.png").read_bytes() for seed in range(100, 108)}
+        self.assertEqual(len(pictures), 8)
+        self.edit(scene, "--screenshot", "all.png", environment={**layer, "NEPHOS_SHOW_EVERY": "3"})
+        self.assertEqual(self.image("all.png").size, (1280, 800))
+        for arguments in ({"script": "wait-step 1\nscreenshot none.png\n"}, {}):
+            options = () if arguments else ("--screenshot", "none.png")
+            said = self.edit(scene, *options, status=4, environment={**layer, "NEPHOS_SHOW_EVERY": "0"}, **arguments)
+            self.assertIn("none.png: the window showed no picture for 10 seconds", said)
 
     def test_scenes(self):
         self.assertIn("no/such.toml", self.edit("no/such.toml", status=3))

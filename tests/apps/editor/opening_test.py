@@ -88,6 +88,36 @@ class Opening(Kept):
         """Its text is nowhere else: the editor asks before it ends, and saving makes the file anew."""
         self.removed_at("wait-step 1\nhashes ready.txt\nwait 2\nkey CTRL+Q\nwait 0.5\n")
 
+    def test_a_file_that_comes_back_answers_no_question(self):
+        """What the editor asks of a file that is gone waits for the user: what it had is in no other place."""
+        scene = self.folder / "a.toml"
+        scene.write_text(STATE, encoding="utf-8")
+        gone, asked = self.folder / "gone.txt", self.folder / "asked.txt"
+        editor = subprocess.Popen(self.command(scene, script="""
+            wait-step 1
+            hashes gone.txt
+            wait 2
+            close-window
+            wait 0.5
+            expect-control "unsaved a.toml"
+            hashes asked.txt
+            wait 4
+            expect-control "unsaved a.toml"
+            click "Go on editing"
+            wait 0.5
+            key CTRL+Z
+            wait 0.5
+            key CTRL+S
+            wait 0.5
+            """), cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+        self.wait_for(gone, editor)
+        scene.unlink()
+        self.wait_for(asked, editor)
+        scene.write_text(STATE.replace("4", "5"), encoding="utf-8")
+        errors = editor.communicate(timeout=120)[1]
+        self.assertEqual(editor.returncode, 0, errors)
+        self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
+
     def test_a_file_that_goes_while_something_is_asked_is_asked_about(self):
         """The answer about another scene says nothing of it."""
         self.removed_at('wait-step 1\nclick "new simulation"\nwait-step 1\nclick scene\nclick "tab Properties"\nset seed 9\nwait 0.3\nclick "simulation 1"\n'

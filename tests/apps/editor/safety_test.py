@@ -359,6 +359,7 @@ class Safety(Kept):
             wait 0.5
             close-window
             wait 20
+            expect-control "nothing any more"
             """)
         self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
         self.assertRegex(taken.read_text(encoding="utf-8"), "seed = 1[23]")
@@ -385,6 +386,7 @@ class Safety(Kept):
             wait 0.5
             click "Stop it and quit"
             wait 20
+            expect-control "nothing any more"
             """)
         self.assertTrue((self.folder / "window.png").is_file())
         self.assertTrue(list((self.folder / "out").iterdir()))
@@ -401,7 +403,7 @@ class Safety(Kept):
                 """ + ("" if answer.startswith("Ask") else """
                 expect-control "unsaved gone.toml"
                 click "Save them"
-                """) + "wait 20\n")
+                """) + "wait 20\nexpect-control \"nothing any more\"\n")
             self.assertEqual((self.folder / "gone.toml").exists(), answer == "Take them")
         self.assertIn("seed = 12", (self.folder / "gone.toml").read_text(encoding="utf-8"))
 
@@ -426,6 +428,7 @@ class Safety(Kept):
                 expect-control "unsaved models-2.toml"
                 click "Discard them"
                 wait 20
+                expect-control "nothing any more"
                 """)
             self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
         self.assertEqual((self.folder / "copy.toml").read_text(encoding="utf-8"), MODELS)

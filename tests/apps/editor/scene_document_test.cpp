@@ -617,6 +617,13 @@ TEST(SchemaValues, NewElementsHaveTheirRequiredKeys) {
         SceneDocument document(text);
         EXPECT_TRUE(document.problems().empty()) << path << "\n" << format(document.problems()) << text;
     }
+    // A flash need not be later than the one before; a wind has to be, also where six digits hide that.
+    const std::string flashes = made(made("name = \"a\"\n", "lightning"), "lightning");
+    EXPECT_EQ(flashes.find("time_s"), std::string::npos) << flashes;
+    const std::string late =
+        made("[[wind]]\ntime_s = 1000000000\nlevels = [{ height_m = 0, from_deg = 0, speed_m_per_s = 1 }]\n",
+             "wind");
+    EXPECT_NE(late.find("time_s = 1000000600"), std::string::npos) << late;
     std::string sky = "name = \"a\"\n";
     for (const char* path : {"model", "sky", "layer"}) sky = made(sky, path);
     EXPECT_TRUE(SceneDocument(sky).problems().empty()) << format(SceneDocument(sky).problems()) << sky;
