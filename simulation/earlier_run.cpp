@@ -200,6 +200,10 @@ SimulationRange range_before(const RunSettings& settings, const Scene& before) {
     };
     if (settings.range == full(settings.scene)) return full(before);
     SimulationRange range = settings.range;
+    // To the last frame that there is, as --frames 5.. says.
+    if (range.has_frames() && range == range_of_frames(settings.scene, range.first_frame, kLastFrame) &&
+        range.first_frame <= frame_count(before))
+        return range_of_frames(before, range.first_frame, kLastFrame);
     if (!range.has_frames()) range.last_step = before.steps;
     return range;
 }

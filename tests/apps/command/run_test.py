@@ -164,6 +164,24 @@ class Run(Case):
         for name in names:
             self.assertEqual(voxels(self.folder / "some/density" / name), voxels(self.folder / "all/density" / name))
 
+    def test_a_range_to_the_end_is_lengthened_with_the_scene(self):
+        """Complete or not; one to a frame that is named stays."""
+        command = ("run", self.scene, "--no-render", "--frames", "2..")
+        self.call(*command, "--set", "time.steps=15", "--out", "whole")
+        self.call(*command, "--set", "time.steps=9", "--out", "longer")
+        first = (self.folder / "longer/density/tiny_0002.vdb").stat().st_mtime_ns
+        self.call(*command, "--set", "time.steps=15", "--out", "longer", "--resume")
+        self.same_runs("whole", "longer")
+        self.assertEqual((self.folder / "longer/density/tiny_0002.vdb").stat().st_mtime_ns, first)
+        killed = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename KILL 1 1", "FAIL_PATH": "tiny_0004"}
+        subprocess.run([NEPHOS, *command, "--set", "time.steps=9", "--out", "stopped"], cwd=self.folder, env=killed, capture_output=True, check=False)
+        self.assertFalse(json.loads((self.folder / "stopped/manifest.json").read_text())["complete"])
+        self.call(*command, "--set", "time.steps=15", "--out", "stopped", "--resume")
+        self.same_runs("whole", "stopped")
+        self.call(*command[:-1], "2..3", "--set", "time.steps=9", "--out", "named")
+        self.call(*command[:-1], "2..3", "--set", "time.steps=15", "--out", "named", "--resume")
+        self.assertEqual(len(list((self.folder / "named/density").iterdir())), 2)
+
     def test_statistics_only_writes_the_same_statistics_and_no_frames(self):
         self.call("run", self.scene, "--no-render", "--out", "all")
         result = self.call("run", self.scene, "--statistics-only", "--out", "some", "--quiet")
