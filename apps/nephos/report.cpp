@@ -62,6 +62,10 @@ int report(const ReportArguments& a) {
     if (!is_empty_file(out)) require_own(out, kReportBeginning, "`nephos report`");
     write_report(plan, records, out);
     print_problems(records.problems());
+    std::uint64_t missing = 0;
+    for (std::uint64_t n = 0; n < plan.runs(); ++n) missing += records.find(plan.run(n).id) == nullptr;
+    if (missing > 0 && !a.work.quiet)
+        print_note(fmt::format("{} of {} runs are missing in the page", missing, plan.runs()));
     if (!a.work.quiet)
         Output().line(fmt::format("{}  one page, without network: open it in a browser", out.string()));
     return records.problems().empty() ? 0 : int(ErrorCode::io);

@@ -151,6 +151,7 @@ class Report(Case):
         self.assertEqual((tags.open, tags.wrong), ([], []))
         self.assertIn("2 runs are missing", page)
         self.assertIn("1 runs failed", page)
+        self.assertIn("2 of 9 runs are missing in the page", self.call("report", "a").stderr)
         for words in ("2 runs are missing", "1 runs failed"):
             self.assertLess(page.index(words), page.index("What was run"))
         self.assertNotIn("<img src=x", page)
