@@ -244,7 +244,7 @@ int AtomicFile::open_again() const {
 }
 
 void AtomicFile::publish() {
-    flush();
+    prepare();
     if (::renameat(folder_, temporary_name_.c_str(), folder_, name_.c_str()) != 0)
         fail(path_, "cannot rename into place", errno);
     published_ = true;
@@ -252,7 +252,7 @@ void AtomicFile::publish() {
 }
 
 bool AtomicFile::publish_where_free() {
-    flush();
+    prepare();
     const int error = rename_where_free(folder_, temporary_name_, folder_, name_);
     if (error == EEXIST) return false;
     if (error != 0) fail(path_, "cannot rename into place", error);
@@ -261,8 +261,8 @@ bool AtomicFile::publish_where_free() {
     return true;
 }
 
-// Makes sure that the temporary file is the one that was made, and gives it its permissions.
-void AtomicFile::flush() const {
+// Makes sure that the temporary file is the one that was made, flushes it, gives it its permissions and asks PublishCheck.
+void AtomicFile::prepare() const {
     struct stat status {};
     // By its path, as its writer found it: in another folder of that name there would be its content.
     if (::lstat(temporary_.c_str(), &status) != 0) fail(path_, "its temporary file is gone", errno);

@@ -58,7 +58,7 @@ class AtomicFile {
     void take_permissions(int fd);
     bool is_created_file(const struct stat& status) const;
     int open_again() const;
-    void flush() const;
+    void prepare() const;
     void flush_folder() const;
     void remove() const;
 
@@ -101,7 +101,8 @@ void write_pieces_atomically(const std::filesystem::path& path,
                              const std::function<void(const AppendPiece& append)>& fill,
                              Folders folders = Folders::made);
 
-// Write and copy a file where nothing stands at its path, also no link. Return false where something does. Errors as above.
+// Write and copy a file where nothing stands at its path, also no link; one to nowhere that is put there meanwhile is followed.
+// Return false where something does. Errors as above.
 bool write_where_free(const std::filesystem::path& path, std::string_view content);
 bool copy_where_free(const std::filesystem::path& from, const std::filesystem::path& to);
 

@@ -10,6 +10,7 @@
 #include "apps/editor/state.h"
 #include "apps/nephos/arguments.h"
 #include "core/error.h"
+#include "core/paths.h"
 
 namespace nephos {
 namespace {
@@ -55,11 +56,11 @@ bool accept(Editor& editor, const fs::path& path) {
                 ask_before(editor, Pending::open, path);
                 return true;
             case FileDialog::save_as:
-                for_each_scene(editor, [&](const OpenScene& open) {
-                    const Scene* const scene = open.document->current_scene();
-                    const bool saves_there = editor.document->has_file() && path == editor.document->path();
-                    if (scene != nullptr && !saves_there) refuse_to_replace_files_of(*scene, path);
-                });
+                if (!editor.document->has_file() || !is_same_place(path, editor.document->path()))
+                    for_each_scene(editor, [&](const OpenScene& open) {
+                        if (const Scene* const scene = open.document->current_scene())
+                            refuse_to_replace_files_of(*scene, path);
+                    });
                 editor.document->save_as(path);
                 note_recent(editor.settings, path);
                 keep_settings(editor);

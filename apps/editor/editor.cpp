@@ -199,8 +199,19 @@ void shortcuts(Editor& editor) {
 }
 
 // Returns whether a picture of the window is due: a frame may have none, as while another program changes the window's size.
-bool awaits_capture(const Editor& editor) {
-    return !editor.capture_to.empty() && !editor.window->is_minimised();
+// A minimised one has none until a script or the user brings it back.
+bool awaits_capture(const Editor& editor, const Script& script) {
+    const bool may_come_back = script.is_active() || editor.capture_by_user;
+    return !editor.capture_to.empty() && !(editor.window->is_minimised() && may_come_back);
+}
+
+// For a picture that did not come.
+void give_up_capture(Editor& editor) {
+    const std::filesystem::path path = std::exchange(editor.capture_to, {});
+    const std::string problem =
+        fmt::format("{}: the window showed no picture for {} seconds", path.string(), kCapturePatience_s);
+    if (!std::exchange(editor.capture_by_user, false)) throw Error(ErrorCode::gpu, problem);
+    say(editor, "Not saved: " + problem, true);
 }
 
 void save_capture(Editor& editor) {
@@ -246,7 +257,8 @@ int loop(Editor& editor, Report& report) {
     Script script = editor.options.script.empty() ? Script() : Script(editor.options.script);
     const bool scripted = !editor.options.script.empty();
     std::string title;
-    Clock::time_point last_frame = Clock::now(), last_input = Clock::now(), last_captured, last_results;
+    Clock::time_point last_frame = Clock::now(), last_input = Clock::now(),
+                      last_without_capture = Clock::now(), last_results;
     bool screenshot_due = !editor.options.screenshot.empty();
     std::vector<std::filesystem::path> dropped;
     while (!editor.quit) {
@@ -276,7 +288,7 @@ int loop(Editor& editor, Report& report) {
         }
         const double interval = seconds_since(last_frame);
         last_frame = Clock::now();
-        if (scripted && script.is_active() && !awaits_capture(editor)) script.apply(editor);
+        if (scripted && script.is_active() && !awaits_capture(editor, script)) script.apply(editor);
         for (std::filesystem::path& path : editor.window->take_dropped()) dropped.push_back(std::move(path));
         if (!dropped.empty() && !press_enter_in_field()) {  // likewise
             const std::vector<std::filesystem::path> paths = std::exchange(dropped, {});
@@ -309,20 +321,16 @@ int loop(Editor& editor, Report& report) {
         }
         if (!editor.capture_to.empty()) editor.window->capture_next();
         editor.window->end_frame();
-        if (!awaits_capture(editor)) {
-            last_captured = Clock::now();
-        } else if (editor.window->is_captured()) {
-            save_capture(editor);
-        } else if (seconds_since(last_captured) > kCapturePatience_s) {
-            throw Error(ErrorCode::gpu, fmt::format("{}: the window showed no picture for {} seconds",
-                                                    editor.capture_to.string(), kCapturePatience_s));
-        }
+        const bool awaits = awaits_capture(editor, script);
+        if (!awaits || editor.window->is_captured()) last_without_capture = Clock::now();
+        if (awaits && editor.window->is_captured()) save_capture(editor);
+        if (seconds_since(last_without_capture) > kCapturePatience_s) give_up_capture(editor);
         if (report.frames++ == 0) report.first_frame_s = seconds_since(report.begin);
         const double spent = seconds_since(last_frame);
         if (report.frames > 3) report.longest_frame_s = std::max(report.longest_frame_s, spent);
         if (report.frames > 3 && busy) report.intervals.push_back(interval);
         const bool is_last = editor.options.screenshot.empty() ? scripted : !screenshot_due;
-        if (is_last && !script.is_active() && !awaits_capture(editor)) editor.quit = true;
+        if (is_last && !script.is_active() && editor.capture_to.empty()) editor.quit = true;
     }
     return 0;
 }

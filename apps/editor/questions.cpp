@@ -57,10 +57,9 @@ void unsaved_dialog(Editor& editor) {
     if (!ImGui::BeginPopupModal(kTitle, nullptr,
                                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
         return;
-    ImGui::Text(editor.document->is_gone() ? "The file of %s is gone from the disk."
-                : editor.document->is_modified()
-                    ? "%s has edits that are not saved."
-                    : "The file of %s is there again. Undo has what was here before.",
+    ImGui::Text(editor.document->is_gone()       ? "The file of %s is gone from the disk."
+                : editor.document->is_modified() ? "%s has edits that are not saved."
+                                                 : "%s is saved: its file has this text.",
                 editor.document->title().c_str());
     editor.controls.note("unsaved " + editor.document->title());
     ImGui::Spacing();

@@ -74,7 +74,7 @@ std::unique_ptr<SceneDocument> SceneDocument::opened(const fs::path& path, const
         std::error_code error;
         if (fs::symlink_status(path, error).type() != fs::file_type::not_found) throw;
         auto gone = std::make_unique<SceneDocument>(std::string(), path.string());
-        gone->has_file_ = gone->is_gone_ = true;
+        gone->has_file_ = gone->is_gone_ = gone->is_in_no_file_ = true;
         gone->real_folder_ = without_links(gone->folder());
         if (gone->left_autosaves(folder).empty()) throw;
         return gone;
@@ -189,7 +189,7 @@ void SceneDocument::save_as(const fs::path& path) {
     path_ = path;
     has_file_ = true;
     real_folder_ = without_links(folder());
-    is_gone_ = false;
+    is_gone_ = is_in_no_file_ = false;
     saved_text_ = text();
     file_stamp_.reset();
     try {
@@ -216,16 +216,21 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
     if (!has_file_) return Disk::same;
     const std::optional<FileStamp> stamp = stamp_of(path_);
     is_gone_ = !stamp;
+    is_in_no_file_ |= is_gone_;
     if (is_gone_) return Disk::gone;
-    if (stamp == file_stamp_) return Disk::same;
+    if (stamp == file_stamp_) {
+        is_in_no_file_ = false;
+        return Disk::same;
+    }
     FileText now;
     try {
         now = read_file(path_);
     } catch (const Error&) {
-        is_gone_ = true;
+        is_gone_ = is_in_no_file_ = true;
         return Disk::gone;
     }
     if (now.text == saved_text_) {
+        is_in_no_file_ = false;
         file_stamp_ = now.stamp;
         return Disk::same;
     }
@@ -236,6 +241,7 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
 
 void SceneDocument::look_whether_gone() {
     if (has_file_) is_gone_ = !stamp_of(path_);
+    is_in_no_file_ |= is_gone_;
 }
 
 void SceneDocument::reload() {
@@ -248,7 +254,7 @@ void SceneDocument::reload() {
 void SceneDocument::take_from_disk(FileText now) {
     saved_text_ = std::move(now.text);
     file_stamp_ = now.stamp;
-    is_gone_ = false;
+    is_gone_ = is_in_no_file_ = false;
     edit(saved_text_, "Change on disk");
 }
 
@@ -263,7 +269,7 @@ std::string SceneDocument::name_elsewhere() const { return coded(real_folder_) +
 void SceneDocument::autosave(const fs::path& folder, const std::string& now) {
     look_whether_gone();
     const bool is_nothing = is_gone_ && now.empty();  // what was left of it was not taken
-    if (is_nothing || (now == saved_text_ && !is_gone_)) return remove_autosave();
+    if (is_nothing || (now == saved_text_ && !is_in_no_file_)) return remove_autosave();
     if (now == autosaved_text_ && autosave_.is_in_place()) return;
     const fs::path beside = autosave_folder(folder);
     try {

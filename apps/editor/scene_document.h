@@ -68,8 +68,8 @@ class SceneDocument {
     // Rises with every change of the text, also by undo.
     std::uint64_t version() const { return version_; }
 
-    // Returns whether there are edits that no file has: also of a file that is gone.
-    bool is_modified() const { return is_gone_ || text() != saved_text_; }
+    // Returns whether there are edits that no file has: also of a file that is gone, or that has come back with another text.
+    bool is_modified() const { return is_in_no_file_ || text() != saved_text_; }
     bool has_file() const { return has_file_; }
     // Returns whether the file was gone when it was last looked at.
     bool is_gone() const { return is_gone_; }
@@ -125,6 +125,7 @@ class SceneDocument {
     std::string merge_, saved_text_;
     std::filesystem::path path_;
     bool has_file_ = false, is_gone_ = false;  // gone: when it was looked at
+    bool is_in_no_file_ = false;  // saved_text_ since the file was gone, until it is there with that text
     std::filesystem::path folder_;         // of one without a file
     std::filesystem::path real_folder_;    // where links led when it was opened or saved
     std::optional<FileStamp> file_stamp_;  // of the version that saved_text_ is

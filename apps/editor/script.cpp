@@ -306,6 +306,8 @@ void Script::begin_line(Editor& editor) {
         // The frame of an input is laid out before the one after it, which may move what the picture shows.
         if (++waited_frames_ < 4) return;
     } else if (command == "screenshot") {
+        if (!editor.capture_to.empty())
+            fail(editor.capture_to.string() + " waits for the window, which is minimised");
         editor.capture_to = rest_of(words, 1);
         mouse_ = ImVec2(-1, -1);  // no tooltip in the picture
     } else if (command == "picture") {

@@ -356,8 +356,7 @@ std::string damage_note(const SourceFrame& frame, const FileDigest& read) {
     if (!frame.listed || *frame.listed == read) return {};
     return frame.file.string() +
            ": is damaged or was changed: it is not the file that the manifest of its run lists (nephos "
-           "verify "
-           "compares all of them)";
+           "verify compares all of them)";
 }
 
 void require_unchanged(const SourceFrame& frame) {

@@ -768,7 +768,7 @@ class Failures(Case):
         """They wait for the next frame that it shows; where none comes the editor says so."""
         scene = self.scene("cumulus-by-hand.toml")
         layer = {"VK_LAYER_PATH": os.environ["LAYERS"], "VK_INSTANCE_LAYERS": "VK_LAYER_NEPHOS_lost_device"}
-        script = "wait-step 1\nkey SPACE\nclick scene\n" + "".join(f"set seed {seed}\nwait 0.2\nscreenshot {seed}.png\n" for seed in range(100, 108))
+        script = "screenshot first.png\nwait-step 1\nkey SPACE\nclick scene\n" + 250 * "screenshot many.png\n" + "".join(f"set seed {seed}\nwait 0.2\nscreenshot {seed}.png\n" for seed in range(100, 108))
         self.edit(scene, script=script, environment={**layer, "NEPHOS_SHOW_EVERY": "3"})
         pictures = {(self.folder / f"{seed}.png").read_bytes() for seed in range(100, 108)}
         self.assertEqual(len(pictures), 8)
@@ -778,6 +778,16 @@ class Failures(Case):
             options = () if arguments else ("--screenshot", "none.png")
             said = self.edit(scene, *options, status=4, environment={**layer, "NEPHOS_SHOW_EVERY": "0"}, **arguments)
             self.assertIn("none.png: the window showed no picture for 10 seconds", said)
+        # That the user has asked for is not worth the edits.
+        self.edit(scene, environment={**layer, "NEPHOS_SHOW_EVERY": "0"}, script="""
+            wait-step 1
+            key F12
+            wait 0.5
+            set "file name" mine.png
+            wait 1
+            expect-control refusal
+            """)
+        self.assertFalse((self.folder / "mine.png").exists())
 
     def test_scenes(self):
         self.assertIn("no/such.toml", self.edit("no/such.toml", status=3))

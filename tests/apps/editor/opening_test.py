@@ -103,12 +103,14 @@ class Opening(Kept):
             hashes asked.txt
             wait 4
             expect-control "unsaved a.toml"
-            click "Go on editing"
+            close-window
             wait 0.5
-            key CTRL+Z
+            expect-control "unsaved a.toml"
+            click "Save them"
             wait 0.5
-            key CTRL+S
-            wait 0.5
+            click "Overwrite it"
+            wait 20
+            expect-control "nothing any more"
             """), cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
         self.wait_for(gone, editor)
         scene.unlink()
