@@ -38,12 +38,11 @@ std::filesystem::path checkpoint_of(const std::filesystem::path& from) {
     const auto refuse = [&](const char* what) {
         throw Error(ErrorCode::io, from.string() + ": " + what + ": expected the folder of a run, or its checkpoint");
     };
-    std::error_code error;
     if (!is_there(from)) refuse("no such run");
-    if (!std::filesystem::is_directory(from, error)) {
+    if (type_behind(from) != std::filesystem::file_type::directory) {
         if (!is_checkpoint(from)) refuse("is no checkpoint of a run");
         // What belongs to it lies beside it, or beside what a link leads to.
-        const bool is_link = std::filesystem::is_symlink(std::filesystem::symlink_status(from, error));
+        const bool is_link = type_at(from) == std::filesystem::file_type::symlink;
         return is_link && !is_of_run_beside(from) ? std::filesystem::canonical(from) : from;
     }
     const std::filesystem::path checkpoint = from / "checkpoint.nephos";

@@ -190,22 +190,27 @@ void refuse_other_pictures(const EarlierRun& earlier, const std::vector<RunInput
             folder.folder.string(), changed));
 }
 
-// The range that the same command line gives for the scene as it was.
-SimulationRange range_before(const RunSettings& settings, const Scene& before) {
+// The range that the same command line gives for the scene as it was: of two that it may mean that of the earlier run.
+SimulationRange range_before(const RunSettings& settings, const Scene& before,
+                             const SimulationRange& earlier) {
+    const SimulationRange& now = settings.range;
+    std::vector<SimulationRange> ranges;
     const auto full = [&](const Scene& scene) {
         SimulationRange range = full_range(scene);
-        if (settings.branch)
-            range.first_frame = settings.range.first_frame;  // the next of the run that it branched off
+        if (settings.branch) range.first_frame = now.first_frame;  // the next of the run that it branched off
         return range;
     };
-    if (settings.range == full(settings.scene)) return full(before);
-    SimulationRange range = settings.range;
+    if (now == full(settings.scene)) ranges.push_back(full(before));
     // To the last frame that there is, as --frames 5.. says.
-    if (range.has_frames() && range == range_of_frames(settings.scene, range.first_frame, kLastFrame) &&
-        range.first_frame <= frame_count(before))
-        return range_of_frames(before, range.first_frame, kLastFrame);
-    if (!range.has_frames()) range.last_step = before.steps;
-    return range;
+    const auto to_the_end = [&](const Scene& scene) {
+        return range_of_frames(scene, now.first_frame, kLastFrame);
+    };
+    if (now.has_frames() && now == to_the_end(settings.scene) && now.first_frame <= frame_count(before))
+        ranges.push_back(to_the_end(before));
+    if (ranges.empty()) ranges.push_back(now);
+    if (!now.has_frames()) ranges.back().last_step = before.steps;
+    const auto found = std::ranges::find(ranges, earlier);
+    return found == ranges.end() ? ranges.front() : *found;
 }
 
 }  // namespace
@@ -351,7 +356,7 @@ Resumption find_resumption(const RunSettings& settings, const RunFolder& folder)
     const bool same =
         earlier.range == settings.range && earlier.render == settings.render;  // without frames neither draws
     if (same && earlier.complete && settings.statistics_only) return Resumption::complete;
-    if (!same && earlier.range != range_before(settings, before))
+    if (!same && earlier.range != range_before(settings, before, earlier.range))
         refuse(folder, "it holds a run of the same scene for " + range_text(earlier));
     return Resumption::start_anew;
 }
@@ -365,9 +370,11 @@ void require_tables_of_run(const RunFolder& folder, const EarlierRun& run, std::
 void require_nothing_appended(const RunFolder& folder, const EarlierRun& run) {
     for (const FileRecord& table : run.tables) {
         const std::filesystem::path path = folder.folder / table.path;
+        if (type_behind(path) == std::filesystem::file_type::not_found) continue;
         std::error_code error;
         const std::uintmax_t size = std::filesystem::file_size(path, error);
-        if (!error && size > table.digest.bytes)
+        if (error) throw ReadFailure(path, error.message(), "examine");
+        if (size > table.digest.bytes)
             throw Error(
                 ErrorCode::io,
                 fmt::format("{}: {} bytes were appended to what the complete run has written, and would be "
@@ -381,7 +388,7 @@ Simulation resumed_simulation(const RunSettings& settings, const RunFolder& fold
     const EarlierRun earlier = read_manifest(folder.manifest());
     const Scene before = scene_before(earlier, settings, folder);
     refuse_other_pictures(earlier, inputs, folder);
-    const SimulationRange range = range_before(settings, before);
+    const SimulationRange range = range_before(settings, before, earlier.range);
     const EarlierRun now{.render = settings.render, .range = range};
     // One that had no frame yet has said nothing of its pictures.
     if (earlier.range != range || (range.has_frames() && earlier.render != settings.render)) {

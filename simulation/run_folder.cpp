@@ -153,17 +153,15 @@ struct Claim {
 void refuse_links(const RunFolder& folder, const Scene& scene) {
     std::vector<std::filesystem::path> files{folder.manifest(), folder.checkpoint(), folder.statistics()};
     for (const LayerOptions& layer : scene.layers) files.push_back(folder.statistics(layer.name));
-    std::error_code error;
     for (const std::filesystem::path& file : files)
-        if (std::filesystem::is_symlink(std::filesystem::symlink_status(file, error)))
+        if (type_at(file) == std::filesystem::file_type::symlink)
             throw Error(ErrorCode::io, file.string() + ": is a link, which is not followed here");
 }
 
 // Throws where the folder of the layers' tables is a link: these are cut and appended to, and a copy of the run would share them.
 void refuse_linked_tables(const RunFolder& folder, ErrorCode code) {
     const std::filesystem::path tables = folder.folder / "statistics";
-    std::error_code error;
-    if (std::filesystem::is_symlink(std::filesystem::symlink_status(tables, error)))
+    if (type_at(tables) == std::filesystem::file_type::symlink)
         throw Error(code,
                     tables.string() + ": is a link, which is not followed here: put the folder itself there");
 }

@@ -315,7 +315,8 @@ void add_run_command(CLI::App& app, Action& action) {
         ->add_option(
             "--from", a->from,
             "Branch off another run: start from its checkpoint (its folder, or the file) with the scene that "
-            "--set changes; without SCENE that of the run. Needs --out; with --resume not needed any more")
+            "--set changes; without SCENE that of the run. Needs --out; with --resume not needed any more "
+            "once the branch has a manifest")
         ->type_name("RUN");
     add_out_folder(*command, a->out, "Folder to write to (default: out/NAME)");
     add_value(*command, "--frames", "A..B",

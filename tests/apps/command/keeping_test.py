@@ -175,6 +175,18 @@ class Keeping(Case):
             self.call(*command, *more, "--out", folder, "--resume")
             self.call("verify", folder)
 
+    def test_a_note_behind_the_rows_where_a_file_cannot_be_examined(self):
+        """Once, at any call: status 3, and it stays."""
+        self.call(*self.plain, "--out", "out")
+        table = self.folder / "out/statistics.csv"
+        noted = table.read_bytes() + b"# my note\n"
+        failing = {**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_PATH": "out/statistics.csv", "FAIL_PROGRAM": "nephos"}
+        for call in range(1, 16):  # it is examined 7 times
+            table.write_bytes(noted)
+            done = subprocess.run([NEPHOS, *self.plain, "--out", "out", "--resume"], cwd=self.folder, env={**failing, "FAIL_CALL": f"stat EIO {call} 1"},
+                                  capture_output=True, text=True, check=False)
+            self.assertEqual((done.returncode, table.read_bytes()), (3, noted), f"{call}: {done.stderr}")
+
     def test_layers_behind_links(self):
         """The folder of a layer on another disk: what others have there is as safe as in the run's own, and no file too many."""
         frames = LAYERED.replace("enabled = false", "count = 2") + "[density]\nper_layer = true\n"

@@ -178,6 +178,11 @@ class Run(Case):
         self.assertFalse(json.loads((self.folder / "stopped/manifest.json").read_text())["complete"])
         self.call(*command, "--set", "time.steps=15", "--out", "stopped", "--resume")
         self.same_runs("whole", "stopped")
+        # From the first on, also where the last step has a frame and the last one before had none.
+        for before, after in ((8, 9), (8, 15), (9, 14)):
+            for name, steps, more in (("all", after, ()), ("short", before, ()), ("short", after, ("--resume",))):
+                self.call(*command[:-1], "1..", "--set", f"time.steps={steps}", "--out", f"{name} {before} {after}", *more)
+            self.same_runs(f"all {before} {after}", f"short {before} {after}")
         self.call(*command[:-1], "2..3", "--set", "time.steps=9", "--out", "named")
         self.call(*command[:-1], "2..3", "--set", "time.steps=15", "--out", "named", "--resume")
         self.assertEqual(len(list((self.folder / "named/density").iterdir())), 2)
