@@ -376,6 +376,16 @@ std::string frame_name(const ExportSequence& sequence, int number, ExportFormat 
     return {};
 }
 
+namespace {
+
+// Throws Error(usage) unless the layers of which weather is told have files of their own.
+void require_files_of_layers(const RunListing& run) {
+    for (const LayerOptions& layer : run.scene.layers)
+        if (has_density(layer) && !run.frames.empty()) density_file(run, run.frames.front(), layer.name);
+}
+
+}  // namespace
+
 std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::vector<std::string>& notes) {
     std::vector<ExportSequence> sequences;
     std::error_code error;
@@ -389,8 +399,11 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
                             ": the run is not complete; its frames so far are exported");
         if (const std::string note = datum_note(run.scene); !options.weather.empty() && !note.empty())
             notes.push_back(note);
+        if (!options.weather.empty()) require_files_of_layers(run);
+        // Weather alone is made of the layers, and needs no file of all together.
+        const bool has_volumes = !all_formats(options).empty() || run.scene.layers.empty();
         std::vector<std::optional<std::string>> layers{options.layer};
-        if (options.layer == "each") {
+        if (options.layer == "each" || (!has_volumes && !run.scene.density_files.combined)) {
             layers.clear();
             for (const LayerOptions& layer : run.scene.layers)
                 if (has_density(layer)) layers.emplace_back(layer.name);

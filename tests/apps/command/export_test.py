@@ -593,6 +593,23 @@ class Export(Case):
                 self.call("verify", name)
                 shutil.rmtree(self.folder / name)
 
+    def test_weather_needs_the_files_of_layers_alone(self):
+        """Not that of all together; without files of layers it is refused before anything is written."""
+        scene = self.write("layered.toml", LAYERED.replace("[density]\n", "[density]\ncombined = false\n"))
+        self.call("run", scene, "--no-render", "--out", "run", "--overwrite")
+        formats = ["--to", "layers", "--to", "wpr", "--to", "cigi"]
+        apart = self.export("apart", *formats)
+        self.call("run", self.write("layered.toml", LAYERED), "--no-render", "--out", "run", "--overwrite")
+        both = self.export("both", *formats)
+        self.assertEqual(*(json.loads((folder / "layered.layers.json").read_text())["frames"] for folder in (apart, both)))
+        names = {path.name for path in both.iterdir()} - {"README.txt", "export.json", "layered.layers.json"}
+        self.assertGreater(len(names), 1)
+        for name in names:
+            self.assertEqual((apart / name).read_bytes(), (both / name).read_bytes(), name)
+        self.call("run", self.write("layered.toml", LAYERED.replace("[density]\n", "[density]\nper_layer = false\n")), "--no-render", "--out", "run", "--overwrite")
+        self.refused(2, "export", "run", *formats, "-o", "none", says="layer 'low' has no density files")
+        self.assertFalse((self.folder / "none").exists())
+
     def test_one_export_at_a_time(self):
         import fcntl
         folder = self.export("out", "--to", "raw")
