@@ -201,7 +201,8 @@ void shortcuts(Editor& editor) {
 // Returns whether a picture of the window is due: a frame may have none, as while another program changes the window's size.
 // A minimised one has none until a script or the user brings it back.
 bool awaits_capture(const Editor& editor, const Script& script) {
-    const bool may_come_back = script.is_active() || editor.capture_by_user;
+    const bool is_attended = editor.options.script.empty() && editor.options.screenshot.empty();
+    const bool may_come_back = script.is_active() || (editor.capture_by_user && is_attended);
     return !editor.capture_to.empty() && !(editor.window->is_minimised() && may_come_back);
 }
 
@@ -317,6 +318,7 @@ int loop(Editor& editor, Report& report) {
         if (screenshot_due && seconds_since(report.begin) > editor.options.after_s && whole &&
             !script.is_active()) {
             editor.capture_to = editor.options.screenshot;
+            editor.capture_by_user = false;
             screenshot_due = false;
         }
         if (!editor.capture_to.empty()) editor.window->capture_next();

@@ -22,6 +22,8 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMostHistoryBytes = 256u << 20;
 // Returns nothing where there is no file.
 std::optional<FileStamp> stamp_of(const fs::path& path) {
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) return std::nullopt;
     const FileStamp stamp = file_stamp(path);
     return stamp == FileStamp{} ? std::nullopt : std::optional(stamp);
 }
@@ -74,11 +76,19 @@ std::unique_ptr<SceneDocument> SceneDocument::opened(const fs::path& path, const
         std::error_code error;
         if (fs::symlink_status(path, error).type() != fs::file_type::not_found) throw;
         auto gone = std::make_unique<SceneDocument>(std::string(), path.string());
-        gone->has_file_ = gone->is_gone_ = gone->is_in_no_file_ = true;
+        gone->has_file_ = gone->is_gone_ = true;
         gone->real_folder_ = without_links(gone->folder());
         if (gone->left_autosaves(folder).empty()) throw;
         return gone;
     }
+}
+
+std::unique_ptr<SceneDocument> SceneDocument::copy(std::string name) const {
+    auto made = std::make_unique<SceneDocument>(saved_text_, std::move(name), folder());
+    made->origin_ = has_file_ ? path_ : origin_;
+    made->edit(text(), "Copy");
+    made->look_at_origin();
+    return made;
 }
 
 void SceneDocument::read() {
@@ -187,6 +197,7 @@ void SceneDocument::save_as(const fs::path& path) {
     const bool moved = !has_file_ || path != path_;
     remove_autosave();
     path_ = path;
+    origin_.clear();
     has_file_ = true;
     real_folder_ = without_links(folder());
     is_gone_ = is_in_no_file_ = false;
@@ -213,10 +224,13 @@ bool SceneDocument::is_changed_on_disk() const {
 }
 
 SceneDocument::Disk SceneDocument::look_at_disk() {
-    if (!has_file_) return Disk::same;
+    if (!has_file_) {
+        look_at_origin();
+        return Disk::same;
+    }
     const std::optional<FileStamp> stamp = stamp_of(path_);
     is_gone_ = !stamp;
-    is_in_no_file_ |= is_gone_;
+    is_in_no_file_ |= is_gone_ && !saved_text_.empty();
     if (is_gone_) return Disk::gone;
     if (stamp == file_stamp_) {
         is_in_no_file_ = false;
@@ -226,7 +240,8 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
     try {
         now = read_file(path_);
     } catch (const Error&) {
-        is_gone_ = is_in_no_file_ = true;
+        is_gone_ = true;
+        is_in_no_file_ |= !saved_text_.empty();
         return Disk::gone;
     }
     if (now.text == saved_text_) {
@@ -239,9 +254,32 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
     return Disk::reloaded;
 }
 
+// Of a copy: whether the file of the original has the text that was saved when it was made.
+void SceneDocument::look_at_origin() {
+    if (origin_.empty() || saved_text_.empty()) return;
+    const std::optional<FileStamp> stamp = stamp_of(origin_);
+    if (stamp && stamp == file_stamp_) {
+        is_in_no_file_ = false;
+        return;
+    }
+    is_in_no_file_ = true;
+    try {
+        const FileText now = read_file(origin_);
+        if (now.text != saved_text_) return;
+        file_stamp_ = now.stamp;
+        is_in_no_file_ = false;
+    } catch (const Error&) {
+        // It is gone, or cannot be read: then no file is known to have it.
+    }
+}
+
 void SceneDocument::look_whether_gone() {
-    if (has_file_) is_gone_ = !stamp_of(path_);
-    is_in_no_file_ |= is_gone_;
+    if (!has_file_) return look_at_origin();
+    is_gone_ = !stamp_of(path_);
+    if (is_gone_)
+        is_in_no_file_ |= !saved_text_.empty();
+    else if (is_in_no_file_)
+        is_in_no_file_ = is_changed_on_disk();
 }
 
 void SceneDocument::reload() {
@@ -269,7 +307,7 @@ std::string SceneDocument::name_elsewhere() const { return coded(real_folder_) +
 void SceneDocument::autosave(const fs::path& folder, const std::string& now) {
     look_whether_gone();
     const bool is_nothing = is_gone_ && now.empty();  // what was left of it was not taken
-    if (is_nothing || (now == saved_text_ && !is_in_no_file_)) return remove_autosave();
+    if (is_nothing || (now == saved_text_ && !is_gone_ && !is_in_no_file_)) return remove_autosave();
     if (now == autosaved_text_ && autosave_.is_in_place()) return;
     const fs::path beside = autosave_folder(folder);
     try {

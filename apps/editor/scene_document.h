@@ -35,6 +35,10 @@ class SceneDocument {
     static std::unique_ptr<SceneDocument> opened(const std::filesystem::path& path,
                                                  const std::filesystem::path& folder);
 
+    // Returns a copy that has never been saved. Edits that are not saved here are not saved there either; nor is its text once the
+    // file of this one has another.
+    std::unique_ptr<SceneDocument> copy(std::string name) const;
+
     const std::string& text() const { return history_[at_].text; }
     // As it was opened or saved last.
     const std::string& saved_text() const { return saved_text_; }
@@ -69,7 +73,7 @@ class SceneDocument {
     std::uint64_t version() const { return version_; }
 
     // Returns whether there are edits that no file has: also of a file that is gone, or that has come back with another text.
-    bool is_modified() const { return is_in_no_file_ || text() != saved_text_; }
+    bool is_modified() const { return is_gone_ || is_in_no_file_ || text() != saved_text_; }
     bool has_file() const { return has_file_; }
     // Returns whether the file was gone when it was last looked at.
     bool is_gone() const { return is_gone_; }
@@ -116,6 +120,7 @@ class SceneDocument {
     static FileText read_file(const std::filesystem::path& path);
     void read();
     void take_from_disk(FileText now);
+    void look_at_origin();
     std::filesystem::path autosave_folder(const std::filesystem::path& folder) const;
     std::string name_elsewhere() const;
 
@@ -127,8 +132,9 @@ class SceneDocument {
     bool has_file_ = false, is_gone_ = false;  // gone: when it was looked at
     bool is_in_no_file_ = false;  // saved_text_ since the file was gone, until it is there with that text
     std::filesystem::path folder_;         // of one without a file
+    std::filesystem::path origin_;         // of a copy without one: the file of the original, if it has one
     std::filesystem::path real_folder_;    // where links led when it was opened or saved
-    std::optional<FileStamp> file_stamp_;  // of the version that saved_text_ is
+    std::optional<FileStamp> file_stamp_;  // of the version that saved_text_ is; of a copy at its origin
     AutosaveFile autosave_;
     std::string autosaved_text_;
     std::uint64_t version_ = 0;

@@ -163,11 +163,7 @@ void copy_scene(Editor& editor) {
     const std::string title = unused_title(editor, editor.document->title());
     const bool runs = editor.running;
     const std::uint64_t step = editor.live->status().step;
-    // Edits that are not saved are not saved in the copy either.
-    auto copy =
-        std::make_unique<SceneDocument>(editor.document->saved_text(), title, editor.document->folder());
-    copy->edit(editor.document->text(), "Copy");
-    if (!add_scene(editor, std::move(copy))) return;
+    if (!add_scene(editor, editor.document->copy(title))) return;
     editor.start_step = step;
     editor.live->run(editor.running = runs);
 }

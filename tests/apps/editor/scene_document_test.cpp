@@ -449,13 +449,70 @@ TEST(SceneDocument, AFileThatIsGoneIsUnsaved) {
     EXPECT_TRUE(document.is_changed_on_disk());
     document.autosave(folder.path);
     EXPECT_EQ(content(folder.path / ".a.toml.autosave"), "seed = 1\n");
-    document.reload();
+    write(path, "seed = 1\n");  // it is in a file again, which a scene that is not shown looks at as well
+    document.autosave(folder.path);
     EXPECT_FALSE(document.is_modified());
+    EXPECT_FALSE(std::filesystem::exists(folder.path / ".a.toml.autosave"));
+    write(path, "seed = 2\n");
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::reloaded);
     std::filesystem::remove(path);
     document.look_at_disk();
     document.save();
     EXPECT_FALSE(document.is_modified());
     EXPECT_EQ(content(path), "seed = 2\n");
+}
+
+// A copy is saved as long as the file of the original has its text.
+TEST(SceneDocument, ACopyIsUnsavedOnceTheOriginalIsAnother) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    SceneDocument document(path);
+    const std::unique_ptr<SceneDocument> copy = document.copy("a-2.toml");
+    const std::unique_ptr<SceneDocument> second = copy->copy("a-3.toml");
+    EXPECT_FALSE(copy->is_modified());
+    document.edit("seed = 2\n", "edit");
+    EXPECT_TRUE(document.copy("a-4.toml")->is_modified());
+    document.save();
+    for (SceneDocument* one : {copy.get(), second.get()}) {
+        one->autosave(folder.path);
+        EXPECT_TRUE(one->is_modified());
+        EXPECT_EQ(content(folder.path / ("." + one->title() + ".autosave")), "seed = 1\n");
+    }
+    write(path, "seed = 1\n");
+    copy->look_at_disk();
+    EXPECT_FALSE(copy->is_modified());
+    std::filesystem::remove(path);
+    copy->look_at_disk();
+    EXPECT_TRUE(copy->is_modified());
+    copy->save_as(folder.path / "b.toml");
+    copy->look_at_disk();
+    EXPECT_FALSE(copy->is_modified());
+}
+
+// A folder in its place is no file of it, also for a scene that is not shown.
+TEST(SceneDocument, AFolderInItsPlace) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    SceneDocument document(path);
+    std::filesystem::remove(path);
+    std::filesystem::create_directory(path);
+    document.autosave(folder.path);
+    EXPECT_TRUE(document.is_gone());
+    EXPECT_EQ(content(folder.path / ".a.toml.autosave"), "seed = 1\n");
+}
+
+// Where edits are left of it, and nothing was taken, it has no text that could be lost.
+TEST(SceneDocument, AFileThatComesBackWhileEditsAreLeftIsRead) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(folder.path / ".a.toml.autosave", "seed = 1\n");
+    const std::unique_ptr<SceneDocument> document = SceneDocument::opened(path, folder.path);
+    EXPECT_TRUE(document->is_modified());
+    write(path, "seed = 2\n");
+    EXPECT_EQ(document->look_at_disk(), SceneDocument::Disk::reloaded);
+    EXPECT_FALSE(document->is_modified());
 }
 
 // A copy of a scene that was never saved leaves its edits beside the scene, which offers them; not those of a scene that
