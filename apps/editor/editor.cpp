@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/editor/capture.h"
 #include "apps/editor/field_text.h"
 #include "apps/editor/report.h"
 #include "apps/editor/script.h"
@@ -23,7 +24,7 @@ namespace {
 
 using Clock = Report::Clock;
 
-constexpr double kFrameSeconds = 1.0 / 60, kIdleSeconds = 0.1, kCapturePatience_s = 10;
+constexpr double kFrameSeconds = 1.0 / 60, kIdleSeconds = 0.1;
 constexpr std::chrono::milliseconds kRowsAlone{200};
 
 // Before a scene is drawn: where the camera of the one before stands there may be ground.
@@ -198,37 +199,6 @@ void shortcuts(Editor& editor) {
     }
 }
 
-// Returns whether a picture of the window is due: a frame may have none, as while another program changes the window's size.
-// A minimised one has none until a script or the user brings it back.
-bool awaits_capture(const Editor& editor, const Script& script) {
-    const bool is_attended = editor.options.script.empty() && editor.options.screenshot.empty();
-    const bool may_come_back = script.is_active() || (editor.capture_by_user && is_attended);
-    return !editor.capture_to.empty() && !(editor.window->is_minimised() && may_come_back);
-}
-
-// For a picture that did not come.
-void give_up_capture(Editor& editor) {
-    const std::filesystem::path path = std::exchange(editor.capture_to, {});
-    const std::string problem =
-        fmt::format("{}: the window showed no picture for {} seconds", path.string(), kCapturePatience_s);
-    if (!std::exchange(editor.capture_by_user, false)) throw Error(ErrorCode::gpu, problem);
-    say(editor, "Not saved: " + problem, true);
-}
-
-void save_capture(Editor& editor) {
-    const WindowImage& image = editor.window->captured();
-    const std::filesystem::path path = std::exchange(editor.capture_to, {});
-    const bool by_user = std::exchange(editor.capture_by_user, false);
-    try {
-        refuse_own_files(editor, path, by_user);
-        save_rgba(path, image.width, image.height, image.rgba);
-    } catch (const Error& error) {
-        if (!by_user) throw;
-        return say(editor, std::string("Not saved: ") + error.what(), true);
-    }
-    say(editor, "Picture of the window: " + path.string());
-}
-
 void draw_interface(Editor& editor) {
     const float scale = ImGui::GetFontSize() / 15;
     editor.controls.last = std::move(editor.controls.now);
@@ -258,8 +228,8 @@ int loop(Editor& editor, Report& report) {
     Script script = editor.options.script.empty() ? Script() : Script(editor.options.script);
     const bool scripted = !editor.options.script.empty();
     std::string title;
-    Clock::time_point last_frame = Clock::now(), last_input = Clock::now(),
-                      last_without_capture = Clock::now(), last_results;
+    Clock::time_point last_frame = Clock::now(), last_input = Clock::now(), last_results;
+    Capture capture;
     bool screenshot_due = !editor.options.screenshot.empty();
     std::vector<std::filesystem::path> dropped;
     while (!editor.quit) {
@@ -321,12 +291,9 @@ int loop(Editor& editor, Report& report) {
             editor.capture_by_user = false;
             screenshot_due = false;
         }
-        if (!editor.capture_to.empty()) editor.window->capture_next();
+        Capture::begin(editor);
         editor.window->end_frame();
-        const bool awaits = awaits_capture(editor, script);
-        if (!awaits || editor.window->is_captured()) last_without_capture = Clock::now();
-        if (awaits && editor.window->is_captured()) save_capture(editor);
-        if (seconds_since(last_without_capture) > kCapturePatience_s) give_up_capture(editor);
+        capture.end(editor, script);
         if (report.frames++ == 0) report.first_frame_s = seconds_since(report.begin);
         const double spent = seconds_since(last_frame);
         if (report.frames > 3) report.longest_frame_s = std::max(report.longest_frame_s, spent);

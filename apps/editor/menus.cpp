@@ -272,7 +272,7 @@ void view_options_panel(Editor& editor) {
         "probabilities of its field, from blue to red for the largest in the slice");
     if (editor.slice_of >= SliceOf::p_hum) ImGui::TextDisabled("red: %.4g per step", editor.slice_most);
     if (editor.slice_of != SliceOf::nothing && editor.slice_cells > 0) {
-        // That of a higher layer stays, for when that one is shown again.
+        // Leaves that of a higher layer as it is, for when that one is shown again.
         int shown = std::min(editor.slice, editor.slice_cells - 1);
         ImGui::SetNextItemWidth(-1);
         if (ImGui::SliderInt("##slice", &shown, 0, editor.slice_cells - 1, "cell %d from below",

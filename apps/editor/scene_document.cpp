@@ -254,7 +254,7 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
     return Disk::reloaded;
 }
 
-// Of a copy: whether the file of the original has the text that was saved when it was made.
+// Looks, for a copy, whether the file of the original still has the text that was saved when it was made.
 void SceneDocument::look_at_origin() {
     if (origin_.empty() || saved_text_.empty()) return;
     const std::optional<FileStamp> stamp = stamp_of(origin_);

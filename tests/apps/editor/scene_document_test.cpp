@@ -503,7 +503,7 @@ TEST(SceneDocument, AFolderInItsPlace) {
     EXPECT_EQ(content(folder.path / ".a.toml.autosave"), "seed = 1\n");
 }
 
-// Where edits are left of it, and nothing was taken, it has no text that could be lost.
+// Has no text that could be lost: edits are left of it, and none were taken.
 TEST(SceneDocument, AFileThatComesBackWhileEditsAreLeftIsRead) {
     const Folder folder;
     const std::filesystem::path path = folder.path / "a.toml";
