@@ -378,6 +378,8 @@ std::string frame_name(const ExportSequence& sequence, int number, ExportFormat 
 
 namespace {
 
+bool is_of_files(const WindField& field) { return field.kind == WindFieldKind::grid; }
+
 // Throws Error(usage) unless the layers of which weather is told have files of their own.
 void require_files_of_layers(const RunListing& run) {
     for (const LayerOptions& layer : run.scene.layers)
@@ -399,6 +401,10 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
                             ": the run is not complete; its frames so far are exported");
         if (const std::string note = datum_note(run.scene); !options.weather.empty() && !note.empty())
             notes.push_back(note);
+        if (!options.weather.empty() && std::ranges::any_of(run.scene.automaton.wind.fields, is_of_files))
+            notes.push_back(
+                "summaries of weather have the wind by height alone: what the scene has from files is not "
+                "in them");
         if (!options.weather.empty()) require_files_of_layers(run);
         // Weather alone is made of the layers, and needs no file of all together.
         const bool has_volumes = !all_formats(options).empty() || run.scene.layers.empty();
@@ -421,7 +427,6 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
         choose_layout(options, s, notes);
         if (options.velocity_name.empty()) continue;
         // These have no velocities without the files: a grid of them would say that the air is calm.
-        const auto is_of_files = [](const WindField& field) { return field.kind == WindFieldKind::grid; };
         const bool has_files = std::erase_if(s.wind_fields, is_of_files) > 0;
         if (has_files)
             notes.push_back(s.name + ": the wind that the scene has from files is not in the grid `" +

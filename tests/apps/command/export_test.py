@@ -215,6 +215,9 @@ class Export(Case):
         said = self.call("export", "filed", "--to", "vdb", "--velocity", "v", "-o", "alone").stderr
         self.assertIn("the wind that the scene has from files is not in the grid `v`", said)
         self.assertIn("no other wind blows: its VDB files have no grid `v`", said)
+        said = self.call("export", "filed", "--to", "layers", "-o", "weather").stderr
+        self.assertIn("what the scene has from files is not in them", said)
+        self.assertNotIn("from files", self.call("export", "run", "--to", "layers", "-o", "profile").stderr)
         self.assertEqual([grid.name for grid in pyopenvdb.readAllGridMetadata(str(self.folder / "alone/filed_0001.vdb"))], ["density"])
 
     def test_verify_of_decimal_places(self):
