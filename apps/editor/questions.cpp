@@ -36,8 +36,7 @@ bool is_nothing_left(const Editor& editor) {
 // Takes the edits that an ended session left, into the scene, or those of a copy of it into a simulation beside it.
 void take_edits(Editor& editor, const LeftAutosave& found) {
     if (found.scene != editor.document->title()) {
-        auto copy = std::make_unique<SceneDocument>(editor.document->saved_text(), found.scene,
-                                                    editor.document->folder());
+        auto copy = editor.document->copy_of_saved(found.scene);
         copy->take_autosave(found);
         if (is_nothing_left(editor))
             open_document(editor, std::move(copy));

@@ -83,10 +83,9 @@ std::unique_ptr<SceneDocument> SceneDocument::opened(const fs::path& path, const
     }
 }
 
-std::unique_ptr<SceneDocument> SceneDocument::copy(std::string name) const {
+std::unique_ptr<SceneDocument> SceneDocument::copy_of_saved(std::string name) const {
     auto made = std::make_unique<SceneDocument>(saved_text_, std::move(name), folder());
     made->origin_ = has_file_ ? path_ : origin_;
-    made->edit(text(), "Copy");
     made->look_at_origin();
     return made;
 }
@@ -223,14 +222,19 @@ bool SceneDocument::is_changed_on_disk() const {
     }
 }
 
+// Keeps in mind that what was saved is in no file any more, also when one is there again.
+void SceneDocument::set_gone(bool is_gone) {
+    is_gone_ = is_gone;
+    is_in_no_file_ |= is_gone && !saved_text_.empty();
+}
+
 SceneDocument::Disk SceneDocument::look_at_disk() {
     if (!has_file_) {
         look_at_origin();
         return Disk::same;
     }
     const std::optional<FileStamp> stamp = stamp_of(path_);
-    is_gone_ = !stamp;
-    is_in_no_file_ |= is_gone_ && !saved_text_.empty();
+    set_gone(!stamp);
     if (is_gone_) return Disk::gone;
     if (stamp == file_stamp_) {
         is_in_no_file_ = false;
@@ -240,8 +244,7 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
     try {
         now = read_file(path_);
     } catch (const Error&) {
-        is_gone_ = true;
-        is_in_no_file_ |= !saved_text_.empty();
+        set_gone(true);
         return Disk::gone;
     }
     if (now.text == saved_text_) {
@@ -275,11 +278,8 @@ void SceneDocument::look_at_origin() {
 
 void SceneDocument::look_whether_gone() {
     if (!has_file_) return look_at_origin();
-    is_gone_ = !stamp_of(path_);
-    if (is_gone_)
-        is_in_no_file_ |= !saved_text_.empty();
-    else if (is_in_no_file_)
-        is_in_no_file_ = is_changed_on_disk();
+    set_gone(!stamp_of(path_));
+    if (!is_gone_ && is_in_no_file_) is_in_no_file_ = is_changed_on_disk();
 }
 
 void SceneDocument::reload() {

@@ -35,9 +35,8 @@ class SceneDocument {
     static std::unique_ptr<SceneDocument> opened(const std::filesystem::path& path,
                                                  const std::filesystem::path& folder);
 
-    // Returns a copy that has never been saved. Edits that are not saved here are not saved there either; nor is its text once the
-    // file of this one has another.
-    std::unique_ptr<SceneDocument> copy(std::string name) const;
+    // Returns a copy without a file, with the text that was saved here. It is_modified() once the file of this one has another.
+    std::unique_ptr<SceneDocument> copy_of_saved(std::string name) const;
 
     const std::string& text() const { return history_[at_].text; }
     // As it was opened or saved last.
@@ -120,6 +119,7 @@ class SceneDocument {
     static FileText read_file(const std::filesystem::path& path);
     void read();
     void take_from_disk(FileText now);
+    void set_gone(bool is_gone);
     void look_at_origin();
     std::filesystem::path autosave_folder(const std::filesystem::path& folder) const;
     std::string name_elsewhere() const;

@@ -163,7 +163,10 @@ void copy_scene(Editor& editor) {
     const std::string title = unused_title(editor, editor.document->title());
     const bool runs = editor.running;
     const std::uint64_t step = editor.live->status().step;
-    if (!add_scene(editor, editor.document->copy(title))) return;
+    // Edits that are not saved are not saved in the copy either.
+    auto copy = editor.document->copy_of_saved(title);
+    copy->edit(editor.document->text(), "Copy");
+    if (!add_scene(editor, std::move(copy))) return;
     editor.start_step = step;
     editor.live->run(editor.running = runs);
 }

@@ -328,6 +328,29 @@ class Safety(Kept):
         self.assertIn("seed = 12", (self.folder / "copy.toml").read_text(encoding="utf-8"))
         self.assertFalse((self.folder / ".models-2.toml.autosave").exists())
 
+    def test_a_copy_that_came_back_is_unsaved_once_its_original_is_another(self):
+        """Also where the edits of it were undone."""
+        scene = self.models()
+        (self.folder / ".models-2.toml.autosave").write_text(MODELS.replace("seed = 4", "seed = 12"), encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            click "Take them"
+            wait-step 1
+            key CTRL+Z
+            wait 0.5
+            click "simulation 1"
+            wait 0.5
+            click scene
+            set seed 77
+            wait 0.5
+            key CTRL+S
+            wait 0.5
+            close-window
+            wait 0.5
+            expect-control "unsaved models-2.toml"
+            """)
+        self.assertIn("seed = 77", scene.read_text(encoding="utf-8"))
+
     def test_the_cross_while_something_is_asked(self):
         """One question after the other, none of which hides the next."""
         scene = self.models()

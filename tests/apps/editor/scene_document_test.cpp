@@ -468,11 +468,13 @@ TEST(SceneDocument, ACopyIsUnsavedOnceTheOriginalIsAnother) {
     const std::filesystem::path path = folder.path / "a.toml";
     write(path, "seed = 1\n");
     SceneDocument document(path);
-    const std::unique_ptr<SceneDocument> copy = document.copy("a-2.toml");
-    const std::unique_ptr<SceneDocument> second = copy->copy("a-3.toml");
+    const std::unique_ptr<SceneDocument> copy = document.copy_of_saved("a-2.toml");
+    const std::unique_ptr<SceneDocument> second = copy->copy_of_saved("a-3.toml");
     EXPECT_FALSE(copy->is_modified());
     document.edit("seed = 2\n", "edit");
-    EXPECT_TRUE(document.copy("a-4.toml")->is_modified());
+    const std::unique_ptr<SceneDocument> edited = document.copy_of_saved("a-4.toml");
+    edited->edit(document.text(), "Copy");
+    EXPECT_TRUE(edited->is_modified());
     document.save();
     for (SceneDocument* one : {copy.get(), second.get()}) {
         one->autosave(folder.path);
