@@ -14,7 +14,7 @@
 //     wait SECONDS           lets time pass, and some frames of the window
 //     wait-step N            until that step is shown (a minute at most)
 //     wait-picture           until the picture is drawn with all its detail (a minute at most)
-//     screenshot FILE        saves a picture of the window
+//     screenshot FILE        saves a picture of the window, once it shows a frame (ten seconds at most)
 //     picture FILE           saves the picture of the clouds alone; "%" in the name becomes its step
 //     hashes FILE            saves the state hashes of the steps that were simulated, as `nephos hash` prints them
 //     expect-control NAME    fails unless the control is there

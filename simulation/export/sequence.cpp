@@ -380,10 +380,15 @@ namespace {
 
 bool is_of_files(const WindField& field) { return field.kind == WindFieldKind::grid; }
 
-// Throws Error(usage) unless the layers of which weather is told have files of their own.
-void require_files_of_layers(const RunListing& run) {
+// Notes what summaries of weather leave out of a run. Throws Error(usage) unless its layers have files of their own.
+void look_at_weather(const RunListing& run, std::vector<std::string>& notes) {
     for (const LayerOptions& layer : run.scene.layers)
         if (has_density(layer) && !run.frames.empty()) density_file(run, run.frames.front(), layer.name);
+    if (const std::string note = datum_note(run.scene); !note.empty()) notes.push_back(note);
+    if (std::ranges::any_of(run.scene.automaton.wind.fields, is_of_files))
+        notes.push_back(
+            "summaries of weather have the wind by height alone: what the scene has from files is not in "
+            "them");
 }
 
 }  // namespace
@@ -399,13 +404,7 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
         if (!run.complete)
             notes.push_back(run.folder.string() +
                             ": the run is not complete; its frames so far are exported");
-        if (const std::string note = datum_note(run.scene); !options.weather.empty() && !note.empty())
-            notes.push_back(note);
-        if (!options.weather.empty() && std::ranges::any_of(run.scene.automaton.wind.fields, is_of_files))
-            notes.push_back(
-                "summaries of weather have the wind by height alone: what the scene has from files is not "
-                "in them");
-        if (!options.weather.empty()) require_files_of_layers(run);
+        if (!options.weather.empty()) look_at_weather(run, notes);
         // Weather alone is made of the layers, and needs no file of all together.
         const bool has_volumes = !all_formats(options).empty() || run.scene.layers.empty();
         std::vector<std::optional<std::string>> layers{options.layer};

@@ -104,8 +104,10 @@ DensityGrid listed_density(const RunListing& run, const ListedFrame& frame,
                            const std::optional<std::string>& layer, std::vector<std::string>& notes) {
     const SourceFrame source = frame_of_run(run, frame, layer);
     DensityGrid density = read_density(source.file);
-    if (std::string note = damage_note(source, file_digest(source.file)); !note.empty())
-        notes.push_back(std::move(note));
+    if (source.listed) {
+        if (std::string note = damage_note(source, file_digest(source.file)); !note.empty())
+            notes.push_back(std::move(note));
+    }
     require_unchanged(source);
     return density;
 }
