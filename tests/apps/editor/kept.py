@@ -93,7 +93,7 @@ class Kept(Case):
 
     def wait_for(self, path, program):
         for _ in range(1200):
-            if path.exists():
+            if path.exists() and path.stat().st_size > 0:  # its name may be claimed before it is written
                 return
             self.assertIsNone(program.poll(), "it ended")
             time.sleep(0.1)
