@@ -244,17 +244,28 @@ void require_same_run(const RunListing& run, const std::filesystem::path& source
     throw Error(ErrorCode::io, source.string() + ": was changed while it was exported: export it again");
 }
 
+// Returns the frames of a run that summaries of weather are made of.
+std::vector<ListedFrame> frames_of_weather(const ExportOptions& options, const RunListing& run) {
+    std::vector<ListedFrame> frames;
+    std::ranges::copy_if(run.frames, std::back_inserter(frames),
+                         [&](const ListedFrame& frame) { return is_wanted(options, frame.number, 1); });
+    return frames;
+}
+
+// Returns the summary of a frame; notes what of it is damaged, unless it was noted of a volume.
+WeatherSummary summarise_once(const RunListing& run, const ListedFrame& frame,
+                              std::vector<std::string>& notes) {
+    std::vector<std::string> damages;
+    WeatherSummary summary = summarise(run, frame, damages);
+    for (std::string& damage : damages)
+        if (std::ranges::count(notes, damage) == 0) notes.push_back(std::move(damage));
+    return summary;
+}
+
 // The summaries of a run's layers, in all forms that are wanted.
 void write_weather(const ExportOptions& options, const RunListing& run,
-                   const std::vector<ExportSequence>& sequences, ExportList& list,
-                   std::vector<std::string>& notes) {
-    std::vector<WeatherSummary> frames;
-    std::vector<std::string> damages;
-    for (const ListedFrame& frame : run.frames) {
-        if (is_wanted(options, frame.number, 1)) frames.push_back(summarise(run, frame, damages));
-    }
-    for (std::string& damage : damages)  // those of volumes were told
-        if (std::ranges::count(notes, damage) == 0) notes.push_back(std::move(damage));
+                   const std::vector<WeatherSummary>& frames, const std::vector<ExportSequence>& sequences,
+                   ExportList& list, std::vector<std::string>& notes) {
     // Its files were opened by their paths, those of volumes before: a folder or link of that name may lead to another run by now.
     require_same_run(run, options.source);
     for (const ExportSequence& s : sequences)
@@ -319,10 +330,10 @@ void refuse_own_folder(const ExportOptions& options, const std::vector<ExportSeq
 }
 
 void write_texts(const ExportOptions& options, const std::optional<RunListing>& run,
-                 const std::vector<ExportSequence>& sequences,
+                 const std::vector<WeatherSummary>& weather, const std::vector<ExportSequence>& sequences,
                  const std::vector<std::vector<FrameFigures>>& figures, ExportList& list,
                  std::vector<std::string>& notes) {
-    if (run) write_weather(options, *run, sequences, list, notes);
+    if (run) write_weather(options, *run, weather, sequences, list, notes);
     const auto write = [&](const std::string& name, const std::string& text) {
         write_text_file(list, name, std::as_bytes(std::span(text)), notes);
     };
@@ -361,15 +372,25 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     ExportReport report = report_of(options, sequences);
     require_space(options.folder, report.needed_bytes);
     GridReader reader(options);
-    std::size_t frames = 0, done = 0;
+    const std::vector<ListedFrame> of_weather =
+        run ? frames_of_weather(options, *run) : std::vector<ListedFrame>();
+    std::size_t frames = of_weather.size(), done = 0;
+    if (!all_formats(options).empty())
+        for (const ExportSequence& s : sequences) frames += s.frames.size();
+    const auto goes_on = [&] { return !progress || progress(done, frames); };
     for (ExportSequence& s : sequences) {
-        frames += s.frames.size();
         if (!options.range_auto) continue;
         float most = 0;
+        bool stopped = false;
         reader.read(s.frames, true, [&](std::size_t, const GridReader::Read& loaded) {
             most = std::max(most, loaded->density.max_value());
-            return true;
+            stopped = !goes_on();
+            return !stopped;
         });
+        if (stopped) {
+            report.notes = std::move(notes);
+            return report;
+        }
         if (most > 0) s.scale = most;
         if (s.scale < kLeastScale || s.scale > kLargestScale)
             throw Error(
@@ -394,6 +415,11 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                             s.frames[of.size()].file.string(), frame.figures.max, s.scale));
         of.push_back(frame.figures);
         ++done;
+    };
+    const auto stop = [&] {
+        list.end(false);
+        report.notes = std::move(notes);
+        return report;
     };
     try {
         list.begin();
@@ -421,7 +447,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                                     lock.require_in_place();
                                     return exporter.write(s, frame, *read);
                                 });
-                                stopped = progress && !progress(done, frames);
+                                stopped = !goes_on();
                                 return !stopped;
                             });
                 work.finish();
@@ -430,15 +456,18 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 throw;
             }
             if (!options.files.empty() || !is_run_folder(options.source)) s.wind = winds.take();
-            if (progress && !stopped) progress(done, frames);
+            stopped = stopped || !goes_on();
             lock.require_in_place();
-            if (stopped) {
-                list.end(false);
-                report.notes = std::move(notes);
-                return report;
-            }
+            if (stopped) return stop();
         }
-        write_texts(options, run, sequences, figures, list, notes);
+        std::vector<WeatherSummary> weather;
+        for (const ListedFrame& frame : of_weather) {
+            weather.push_back(summarise_once(*run, frame, notes));
+            lock.require_in_place();
+            ++done;
+            if (!goes_on()) return stop();
+        }
+        write_texts(options, run, weather, sequences, figures, list, notes);
         lock.require_in_place();
         std::ranges::move(list.remove_left_over(), std::back_inserter(notes));
         list.end(true);

@@ -380,15 +380,14 @@ namespace {
 
 bool is_of_files(const WindField& field) { return field.kind == WindFieldKind::grid; }
 
-// Notes what summaries of weather leave out of a run. Throws Error(usage) unless its layers have files of their own.
+// Notes what a reader of summaries of weather has to know. Throws Error(usage) unless the layers have files of their own.
 void look_at_weather(const RunListing& run, std::vector<std::string>& notes) {
     for (const LayerOptions& layer : run.scene.layers)
         if (has_density(layer) && !run.frames.empty()) density_file(run, run.frames.front(), layer.name);
     if (const std::string note = datum_note(run.scene); !note.empty()) notes.push_back(note);
-    if (std::ranges::any_of(run.scene.automaton.wind.fields, is_of_files))
+    if (!run.scene.automaton.wind.fields.empty())
         notes.push_back(
-            "summaries of weather have the wind by height alone: what the scene has from files is not in "
-            "them");
+            "summaries of weather have the wind by height alone: what `[[wind_field]]` adds is not in them");
 }
 
 }  // namespace
@@ -412,7 +411,7 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
             layers.clear();
             for (const LayerOptions& layer : run.scene.layers)
                 if (has_density(layer)) layers.emplace_back(layer.name);
-            if (layers.empty()) throw Error(ErrorCode::usage, "--layer each: the scene has no layers");
+            if (layers.empty()) throw Error(ErrorCode::usage, "the scene has no layers with a density");
         } else if (options.layer == "all") {
             layers = {std::nullopt};
         }

@@ -216,8 +216,11 @@ class Export(Case):
         self.assertIn("the wind that the scene has from files is not in the grid `v`", said)
         self.assertIn("no other wind blows: its VDB files have no grid `v`", said)
         said = self.call("export", "filed", "--to", "layers", "-o", "weather").stderr
-        self.assertIn("what the scene has from files is not in them", said)
-        self.assertNotIn("from files", self.call("export", "run", "--to", "layers", "-o", "profile").stderr)
+        self.assertIn("what `[[wind_field]]` adds is not in them", said)
+        self.assertNotIn("wind_field", self.call("export", "run", "--to", "layers", "-o", "profile").stderr)
+        vortex = "[[wind_field]]\nkind = \"vortex\"\nradius_m = 300\nspeed_m_per_s = 20\n"
+        self.call("run", self.write("formula.toml", SCENE + vortex), "--no-render", "--out", "formula")
+        self.assertIn("what `[[wind_field]]` adds is not in them", self.call("export", "formula", "--to", "metar", "-o", "of-formula").stderr)
         self.assertEqual([grid.name for grid in pyopenvdb.readAllGridMetadata(str(self.folder / "alone/filed_0001.vdb"))], ["density"])
 
     def test_verify_of_decimal_places(self):

@@ -285,6 +285,31 @@ class InterruptedExport(Case):
             self.assertEqual([path.name for path in (self.folder / "out").iterdir()], ["export.json"])
             shutil.rmtree(self.folder / "out")
 
+    def test_a_signal_stops_weather(self):
+        """Also behind the last volume; the same command goes on."""
+        for stop, path, formats in (("rename STOP 1 1", "export.json", ["--to", "layers"]), ("rename STOP 4 1", "placed_", ["--to", "raw", "--to", "metar"])):
+            whole = self.export("whole", *formats)
+            process = self.stopped(stop, path, "export", "run", *formats, "-o", "out")
+            process.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGCONT)
+            error = process.communicate(timeout=60)[1]
+            self.assertEqual(process.returncode, 130, error)
+            self.assertIn("stopped; the same command goes on", error)
+            self.assertEqual(list((self.folder / "out").glob("placed.*")), [])
+            out = self.export("out", *formats)
+            self.assertEqual({file.name: file.read_bytes() for file in out.iterdir()}, {file.name: file.read_bytes() for file in whole.iterdir()})
+            shutil.rmtree(out)
+            shutil.rmtree(whole)
+
+    def test_a_signal_while_the_largest_value_is_looked_for(self):
+        """By --range auto, before anything is written."""
+        process = self.stopped("read STOP 1 1", "density/placed_0002", "export", "run", "--to", "raw", "--range", "auto", "-o", "out")
+        process.send_signal(signal.SIGTERM)
+        process.send_signal(signal.SIGCONT)
+        error = process.communicate(timeout=60)[1]
+        self.assertEqual(process.returncode, 143, error)
+        self.assertFalse((self.folder / "out").exists())
+
     def test_weather_of_a_run_that_is_exchanged(self):
         """A link that leads to another run by now, also to one without the frames asked for: refused; with the first one again it goes on."""
         self.call("run", "placed.toml", "--no-render", "--out", "second", "--seed", "9")
