@@ -224,8 +224,7 @@ void update_title(Editor& editor, std::string& shown) {
 }
 
 // Returns the exit status.
-int loop(Editor& editor, Report& report) {
-    Script script = editor.options.script.empty() ? Script() : Script(editor.options.script);
+int loop(Editor& editor, Script& script, Report& report) {
     const bool scripted = !editor.options.script.empty();
     std::string title;
     Clock::time_point last_frame = Clock::now(), last_input = Clock::now(), last_results;
@@ -286,7 +285,7 @@ int loop(Editor& editor, Report& report) {
             editor.picture ? editor.running || editor.picture->refined || !editor.view.detail
                            : !editor.document->problems().empty() || !editor.live->status().failure.empty();
         if (screenshot_due && seconds_since(report.begin) > editor.options.after_s && whole &&
-            !script.is_active()) {
+            !script.is_active() && editor.capture_to.empty()) {
             editor.capture_to = editor.options.screenshot;
             editor.capture_by_user = false;
             screenshot_due = false;
@@ -455,13 +454,14 @@ void save_rgba(const std::filesystem::path& path, int width, int height, std::sp
 
 int run_editor(const EditorOptions& options) {
     Report report;
+    Script script = options.script.empty() ? Script() : Script(options.script);
     defer_signals();
     Editor editor(options);
     if (editor.document->has_file()) note_recent(editor.settings, editor.document->path());
     if (options.screenshot.empty()) editor.left_autosaves = editor.document->left_autosaves(editor.folder);
     int status = 0;
     try {
-        status = loop(editor, report);
+        status = loop(editor, script, report);
     } catch (const Error& error) {
         const std::string kept = kept_edits(editor);
         if (kept.empty()) throw;
@@ -483,6 +483,7 @@ int run_editor(const EditorOptions& options) {
     for_each_scene(editor, [](OpenScene& scene) { scene.document->remove_autosave(); });
     keep_settings(editor);
     if (!failure.empty()) throw Error(ErrorCode::io, failure);
+    script.require_read();
     if (!options.screenshot.empty() && !editor.picture) {
         if (!editor.document->problems().empty()) throw SceneErrors(editor.document->problems());
         const std::string failed = editor.live->status().failure;

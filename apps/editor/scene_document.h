@@ -35,7 +35,8 @@ class SceneDocument {
     static std::unique_ptr<SceneDocument> opened(const std::filesystem::path& path,
                                                  const std::filesystem::path& folder);
 
-    // Returns a copy without a file, with the text that was saved here. It is_modified() once the file of this one has another.
+    // Returns a copy without a file, with the text that was saved here. It is_modified() while the file of this one does
+    // not have it.
     std::unique_ptr<SceneDocument> copy_of_saved(std::string name) const;
 
     const std::string& text() const { return history_[at_].text; }
@@ -130,7 +131,7 @@ class SceneDocument {
     std::string merge_, saved_text_;
     std::filesystem::path path_;
     bool has_file_ = false, is_gone_ = false;  // gone: when it was looked at
-    bool is_in_no_file_ = false;  // saved_text_ since the file was gone, until it is there with that text
+    bool is_in_no_file_ = false;  // saved_text_: the file, or that of the original, is gone or another
     std::filesystem::path folder_;         // of one without a file
     std::filesystem::path origin_;         // of a copy without one: the file of the original, if it has one
     std::filesystem::path real_folder_;    // where links led when it was opened or saved

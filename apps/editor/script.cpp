@@ -21,7 +21,7 @@
 namespace nephos {
 namespace {
 
-constexpr std::chrono::seconds kPatience{10}, kLongPatience{60};
+constexpr std::chrono::seconds kPatience{10}, kPatienceOfEnd{20}, kLongPatience{60};
 constexpr double kMostPixels = 16384;
 
 const std::map<std::string, int>& commands() {  // and how many words follow at least
@@ -45,6 +45,7 @@ const std::map<std::string, int>& commands() {  // and how many words follow at 
                                                   {"restore", 0},
                                                   {"random", 2},
                                                   {"close-window", 0},
+                                                  {"expect-end", 0},
                                                   {"quit", 0}};
     return known;
 }
@@ -119,6 +120,15 @@ Script::Script(const std::filesystem::path& path) : path_(path) {
                                               "' is no command of a script (docs/editor.md)");
         }
         lines_.push_back(std::move(line));
+    }
+}
+
+void Script::require_read() const {
+    for (const Line& line : lines_) {
+        if (line.words.front() == "wait" || line.words.front() == "expect-end") continue;
+        throw Error(ErrorCode::check, path_.string() + ":" + std::to_string(line.number) + ": `" +
+                                          rest_of(line.words, 0) +
+                                          "` was not reached: the editor had ended before");
     }
 }
 
@@ -338,8 +348,11 @@ void Script::begin_line(Editor& editor) {
         random_.seed(unsigned(number(2, 0, 4294967295.0)));
     } else if (command == "close-window") {
         editor.window->ask_to_close(true);
+    } else if (command == "expect-end") {
+        return waited(kPatienceOfEnd, "the end of the editor");
     } else if (command == "quit") {
         editor.quit = true;
+        lines_.resize(1);
     }
     done();
 }

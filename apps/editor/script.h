@@ -14,7 +14,8 @@
 //     wait SECONDS           lets time pass, and some frames of the window
 //     wait-step N            until that step is shown (a minute at most)
 //     wait-picture           until the picture is drawn with all its detail (a minute at most)
-//     screenshot FILE        saves a picture of the window, once it shows a frame (ten seconds at most)
+//     screenshot FILE        saves a picture of the window, once it shows a frame (ten seconds at most; a minimised window
+//                            is not waited for while there are lines)
 //     picture FILE           saves the picture of the clouds alone; "%" in the name becomes its step
 //     hashes FILE            saves the state hashes of the steps that were simulated, as `nephos hash` prints them
 //     expect-control NAME    fails unless the control is there
@@ -23,8 +24,10 @@
 //     random N SEED          N random clicks, drags and keys
 //     close-window           presses the cross of the window
 //     quit                   ends at once, whatever is unsaved
+//     expect-end             fails unless the editor ends within twenty seconds
 //
-// A control that is not there within ten seconds ends the program with status 1 and says which there are.
+// A control that is not there within ten seconds ends the program with status 1 and says which there are; so does an end of
+// the editor before a line that would have done anything.
 
 #include <chrono>
 #include <cstdint>
@@ -49,6 +52,8 @@ class Script {
     bool is_random() const { return random_left_ > 0; }
     // Gives ImGui the input of this frame; between its NewFrame() of the back end and its own. Throws Error(check).
     void apply(Editor& editor);
+    // Throws Error(check) where lines are left that the editor, which has ended, should have read.
+    void require_read() const;
 
   private:
     struct Line {

@@ -806,6 +806,14 @@ class Failures(Case):
             self.assertIn("a quotation mark that is not closed", self.edit(script=f"{line}\n", status=2))
         self.assertIn("no control", self.edit(script="click nothing of that name\n", status=1))
 
+    def test_lines_behind_the_end_are_told(self):
+        """What was expected there was not looked at; but nothing is missed behind `quit`, and by what waits for the end."""
+        said = self.edit(script="wait 1\nclose-window\nwait 5\nexpect-control \"unsaved nothing.toml\"\n", status=1)
+        self.assertIn("script.txt:4: `expect-control unsaved nothing.toml` was not reached: the editor had ended before", said)
+        self.edit(script="wait 1\nclose-window\nwait 5\nexpect-end\n")
+        self.edit(script="wait 1\nquit\nclick nothing\n")
+        self.assertIn("script.txt:2: waited too long for the end", self.edit(script="wait 1\nexpect-end\n", status=1))
+
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], *[f"{name}" for name in sys.argv[1:]]], verbosity=2)

@@ -109,8 +109,7 @@ class Opening(Kept):
             click "Save them"
             wait 0.5
             click "Overwrite it"
-            wait 20
-            expect-control "nothing any more"
+            expect-end
             """), cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
         self.wait_for(gone, editor)
         scene.unlink()

@@ -381,8 +381,7 @@ class Safety(Kept):
             set "file name" taken.toml
             wait 0.5
             close-window
-            wait 20
-            expect-control "nothing any more"
+            expect-end
             """)
         self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
         self.assertRegex(taken.read_text(encoding="utf-8"), "seed = 1[23]")
@@ -408,8 +407,7 @@ class Safety(Kept):
             close-window
             wait 0.5
             click "Stop it and quit"
-            wait 20
-            expect-control "nothing any more"
+            expect-end
             """)
         self.assertTrue((self.folder / "window.png").is_file())
         self.assertTrue(list((self.folder / "out").iterdir()))
@@ -426,7 +424,7 @@ class Safety(Kept):
                 """ + ("" if answer.startswith("Ask") else """
                 expect-control "unsaved gone.toml"
                 click "Save them"
-                """) + "wait 20\nexpect-control \"nothing any more\"\n")
+                """) + "expect-end\n")
             self.assertEqual((self.folder / "gone.toml").exists(), answer == "Take them")
         self.assertIn("seed = 12", (self.folder / "gone.toml").read_text(encoding="utf-8"))
 
@@ -450,8 +448,7 @@ class Safety(Kept):
                 wait 0.5
                 expect-control "unsaved models-2.toml"
                 click "Discard them"
-                wait 20
-                expect-control "nothing any more"
+                expect-end
                 """)
             self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
         self.assertEqual((self.folder / "copy.toml").read_text(encoding="utf-8"), MODELS)
