@@ -493,8 +493,8 @@ class Fields(Kept):
         scene = self.folder / "q.toml"
         scene.write_text('seed = 4\n[lattice]\ncells = [16, 16, 12]\n', encoding="utf-8")
         typed = 'wait-step 1\nclick scene\nclick "tab Properties"\nwait 0.2\nclick seed\nkey END\ntype x\nwait 0.2\n'
-        self.edit(scene, script=f"{typed}key CTRL+Q\nwait 0.5\nexpect-control refusal\nwait 1\nkey CTRL+Q\nwait 0.5\nexpect-control nothing\n")
-        self.assertIn("no control 'nothing'", self.edit(scene, script=f"{typed}key CTRL+Q\nwait 0.5\nexpect-control nothing\n", status=1))
+        self.edit(scene, script=f"{typed}key CTRL+Q\nwait 0.5\nexpect-control refusal\nwait 1\nkey CTRL+Q\nwait 0.5\nexpect-end\n")
+        self.assertIn("waited too long for the end", self.edit(scene, script=f"{typed}key CTRL+Q\nwait 0.5\nexpect-end\n", status=1))
 
     def test_a_comma_is_a_point(self):
         scene = self.folder / "k.toml"

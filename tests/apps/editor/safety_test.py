@@ -275,7 +275,7 @@ class Safety(Kept):
             wait 0.3
             click "Save them"
             wait 0.5
-            expect-control "is not reached: it has ended"
+            expect-end
             """)
         self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
 
