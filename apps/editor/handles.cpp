@@ -48,6 +48,11 @@ double along(const ImVec2& pixels, double unit) {
     return (double(by.x) * pixels.x + double(by.y) * pixels.y) / length2 * unit;
 }
 
+// Returns the value of the handle that is held, once it is another than `now`: one that is seen end on writes nothing.
+std::optional<double> moved_from(double now) {
+    return grip.is_moved && grip.value != now ? std::optional(grip.value) : std::nullopt;
+}
+
 }  // namespace
 
 void world_line(const Editor& editor, const Vec3& from, const Vec3& to, ImU32 colour, float width) {
@@ -110,7 +115,7 @@ std::optional<double> axis_handle(Editor& editor, const std::string& name, const
     if (!knob(editor, name, *b, colour, taken)) return std::nullopt;
     if (taken) grip.value = value;
     grip.value += along(ImVec2(b->x - a->x, b->y - a->y), size_m);
-    return grip.is_moved ? std::optional(grip.value) : std::nullopt;
+    return moved_from(value);
 }
 
 std::optional<double> angle_handle(Editor& editor, const std::string& name,
@@ -122,7 +127,7 @@ std::optional<double> angle_handle(Editor& editor, const std::string& name,
     if (!knob(editor, name, *at, colour, taken)) return std::nullopt;
     if (taken) grip.value = value_deg;
     grip.value += along(ImVec2(next->x - at->x, next->y - at->y), kStep);
-    return grip.is_moved ? std::optional(grip.value) : std::nullopt;
+    return moved_from(value_deg);
 }
 
 std::optional<Vec3> free_handle(Editor& editor, const std::string& name, const Vec3& place, ImU32 colour) {

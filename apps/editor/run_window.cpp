@@ -21,6 +21,7 @@ void start_run(Editor& editor) {
     state.folder = fs::path("out") / of_text.name;
     state.thread = std::thread([&state, scene = of_text, file = editor.document->path().string()] {
         std::string result, failure;
+        bool is_complete = false;
         try {
             RunSettings settings = run_settings(scene, file);
             settings.folder = state.folder;
@@ -37,16 +38,18 @@ void start_run(Editor& editor) {
                               std::to_string(progress.frames) + "/" + std::to_string(progress.frames_in_all);
             };
             const RunReport report = run_scene(std::move(settings), observer);
-            result = report.complete ? "complete: " + std::to_string(report.frames) + " frames in " +
-                                           report.folder.string()
-                                     : "stopped; `nephos run --resume --out " +
-                                           shell_word(report.folder.string()) + "` goes on";
+            is_complete = report.complete;
+            result = is_complete ? "complete: " + std::to_string(report.frames) + " frames in " +
+                                       report.folder.string()
+                                 : "stopped; `nephos run --resume --out " +
+                                       shell_word(report.folder.string()) + "` goes on";
         } catch (const std::exception& error) {
             failure = error.what();
         }
         const std::scoped_lock lock(state.mutex);
         state.result = result;
         state.failure = failure;
+        if (is_complete) state.fraction = 1;
         state.done = true;
     });
     editor.run = std::move(run);
@@ -57,9 +60,11 @@ void start_run(Editor& editor) {
 void run_window(Editor& editor) {
     if (!editor.show_run) return;
     const float em = ImGui::GetFontSize();
-    ImGui::SetNextWindowSize(ImVec2(32 * em, 0), ImGuiCond_Appearing);
+    // As high as what it shows, which grows once the run begins.
+    ImGui::SetNextWindowSizeConstraints(ImVec2(32 * em, 0), ImVec2(32 * em, 32 * em));
     if (ImGui::Begin("Run the scene", &editor.show_run,
-                     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoCollapse)) {
+                     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoCollapse |
+                         ImGuiWindowFlags_AlwaysAutoResize)) {
         ImGui::TextWrapped(
             "Simulates the whole scene as it stands and writes density grids, pictures and statistics, "
             "as `nephos run` does.");
@@ -72,8 +77,7 @@ void run_window(Editor& editor) {
             if (button(editor, "Start the run")) attempt(editor, [&] { start_run(editor); });
         } else {
             const std::scoped_lock lock(editor.run->mutex);
-            ImGui::ProgressBar(
-                float(editor.run->done && editor.run->failure.empty() ? 1 : editor.run->fraction));
+            ImGui::ProgressBar(float(editor.run->fraction));
             editor.controls.note("run progress");
             const std::string text = !editor.run->failure.empty()  ? editor.run->failure
                                      : !editor.run->result.empty() ? editor.run->result
