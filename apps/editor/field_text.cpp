@@ -144,7 +144,7 @@ bool edited(const char* label, std::string& text, const Show& show) {
     const std::string before = field;
     const bool result = show(field, is_held ? 0 : ImGuiInputTextFlags_ReadOnly);
     field.resize(std::min(field.size(), field.find('\0')));  // what ImGui leaves behind its end
-    if (ImGui::GetInputTextState(id) != nullptr) last_field() = {id, before, field};
+    if (ImGui::GetInputTextState(id) != nullptr) last_field() = {id, before, is_held ? field : before};
     if (is_held && field != before) text = text_of_field(field);
     return result;
 }

@@ -309,23 +309,24 @@ class Fields(Kept):
         self.assertNotEqual(saved, typed)
         self.assertIn(", 5.123456789012, 7.1125e2]", saved)
 
-    def test_a_text_with_a_comma_is_not_divided(self):
+    def test_texts_that_no_field_can_hold_stay(self):
+        """A list whose member has a comma, and a text with a byte of 0."""
         scene = self.folder / "a.toml"
-        text = 'models = "a,b.toml"\nname = "s"\n'
-        scene.write_text(text, encoding="utf-8")
-        self.edit(scene, script="""
-            wait 1
-            click scene
-            wait 0.2
-            click models
-            key END
-            type x
-            key ENTER
-            wait 0.3
-            key CTRL+S
-            wait 0.5
-            """)
-        self.assertEqual(scene.read_text(encoding="utf-8"), text)
+        for key, text in (("models", 'models = "a,b.toml"\nname = "s"\n'), ("name", 'name = "a\\u0000bc" # n\n')):
+            scene.write_text(text, encoding="utf-8")
+            self.edit(scene, script=f"""
+                wait 1
+                click scene
+                wait 0.2
+                click {key}
+                key END
+                type x
+                key ENTER
+                wait 0.3
+                key CTRL+S
+                wait 0.5
+                """)
+            self.assertEqual(scene.read_text(encoding="utf-8"), text)
 
     def test_a_window_that_another_program_destroys_keeps_the_edits(self):
         scene = self.models()
