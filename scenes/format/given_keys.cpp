@@ -125,4 +125,13 @@ std::string given_toml(const Scene& scene) {
     return keys + sections;
 }
 
+std::string given_genus(const Scene& scene, std::size_t layer) {
+    if (!scene.given.root) return {};
+    const Node& root = *scene.given.root;
+    const Entry* const layers = root.find("layer");
+    if (layers == nullptr || layer >= layers->value.items.size()) return {};
+    const Entry* const genus = layers->value.items[layer].find("genus");
+    return genus == nullptr ? std::string() : genus->value.text;
+}
+
 }  // namespace nephos

@@ -5,6 +5,7 @@
 // defaults follow other keys: the box of a scatter the lattice, the field of a layer the common one. In the canonical text
 // (writer.h) they are numbers that follow nothing any more; in this one they still do, so it is the one to change later.
 
+#include <cstddef>
 #include <string>
 
 #include "scenes/format/scene.h"
@@ -16,5 +17,9 @@ namespace nephos {
 // change is seen. A scene
 // that was not read from a text has to_toml(). Thread-safe.
 std::string given_toml(const Scene& scene);
+
+// Returns the abbreviation that a layer was given as its `genus`; "" without. In the canonical text it is heights alone.
+// Thread-safe.
+std::string given_genus(const Scene& scene, std::size_t layer);
 
 }  // namespace nephos

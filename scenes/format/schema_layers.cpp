@@ -371,12 +371,13 @@ const Section& climate_section() {
 
 const Section& layer_section() {
     static const Section section = [] {
-        Key genus =
-            plain_key(KeyKind::word, "genus", {}, {},
-                      "Instead of `base_height_m`: the heights of this genus in `climate.region` above "
-                      "`ground.height_m`, as far as they lie in the lattice. The base of a veil is their middle if "
-                      "it has no `base_m`, and so is the bottom of its lattice if that has no `origin_m`.",
-                      "T, 2");
+        Key genus = plain_key(
+            KeyKind::word, "genus", {}, {},
+            "Instead of `base_height_m`: the heights of this genus in `climate.region` above "
+            "`ground.height_m`, as far as they lie in the lattice. The base of a veil is their middle if "
+            "it has no `base_m`, and so is the bottom of its lattice if that has no `origin_m`. "
+            "Exports of weather call the layer so.",
+            "T, 2");
         for (const GenusFacts& facts : genera()) genus.words.push_back(facts.abbreviation);
         Section layers{
             "Layers",

@@ -108,8 +108,7 @@ ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& r
         layer ? std::optional(layer_index(run.scene, *layer)) : std::nullopt;
     s.wind = wind_of(run.scene, index, s);
     if (moves_with_fields(run.scene, index)) s.wind_fields = run.scene.automaton.wind.fields;
-    if (index || run.scene.layers.size() == 1)
-        s.genus = genus_of(run.scene, run.scene.layers[index.value_or(0)]);
+    if (index || run.scene.layers.size() == 1) s.genus = genus_of(run.scene, index.value_or(0));
     return s;
 }
 
@@ -407,7 +406,7 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
         // Weather alone is made of the layers, and needs no file of all together.
         const bool has_volumes = !all_formats(options).empty() || run.scene.layers.empty();
         std::vector<std::optional<std::string>> layers{options.layer};
-        if (options.layer == "each" || (!has_volumes && !run.scene.density_files.combined)) {
+        if (options.layer == "each" || !has_volumes) {
             layers.clear();
             for (const LayerOptions& layer : run.scene.layers)
                 if (has_density(layer)) layers.emplace_back(layer.name);

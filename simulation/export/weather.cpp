@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "density/vdb/vdb_file.h"
+#include "scenes/format/given_keys.h"
 #include "scenes/metar/metar.h"
 #include "scenes/metar/metar_scene.h"
 #include "seeds/genera.h"
@@ -56,7 +57,8 @@ Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : 
 
 }  // namespace
 
-std::string genus_of(const Scene& scene, const LayerOptions& layer) {
+std::string genus_of(const Scene& scene, std::size_t n) {
+    const LayerOptions& layer = scene.layers.at(n);
     // "Cu", "Cu1", "Cu-2": a name that is an abbreviation, and perhaps a number.
     const auto of_name = [](const std::string& name) -> std::string {
         static constexpr const char* kGenera[] = {"Ci", "Cc", "Cs", "Ac", "As", "Ns",
@@ -66,6 +68,7 @@ std::string genus_of(const Scene& scene, const LayerOptions& layer) {
                 return genus;
         return {};
     };
+    if (const std::string genus = given_genus(scene, n); !genus.empty()) return genus.substr(0, 2);
     if (std::string genus = of_name(layer.name); !genus.empty()) return genus;
     if (layer.is_veil) {
         switch (layer.veil.form) {
@@ -135,7 +138,7 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame, std::v
         LayerSummary s =
             summary_of(run, scene.layers[n].name, listed_density(run, frame, scene.layers[n].name, notes),
                        layer_wind(scene, n), frame.time_s);
-        s.genus = genus_of(scene, scene.layers[n]);
+        s.genus = genus_of(scene, n);
         s.towering = s.genus == "Cu" && s.columns.top_m - s.columns.cloud_base_m > kTowering_m;
         for (const RainRecord& area : frame.rain)
             if (area.layer == s.name) s.rain_mm_per_h = std::max(s.rain_mm_per_h, area.intensity_mm_per_h);
@@ -153,12 +156,14 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame, std::v
         w.visibility_m = std::min(9999.0, kKoschmieder / fog.extinction_per_m);
         w.fog_depth_m = fog.height_m;
     }
+    std::size_t raining = 0;
     for (const RainRecord& area : frame.rain) {
+        if (area.intensity_mm_per_h > 0) ++raining;
         if (!(area.intensity_mm_per_h > w.rain_mm_per_h)) continue;
         w.rain_mm_per_h = area.intensity_mm_per_h;
         w.precipitation = is_precipitation(area.layer) ? area.layer : "";
     }
-    w.showers = frame.rain.size() > 1;
+    w.showers = raining > 1;
     w.snow = scene.render.precipitation.kind == PrecipitationKind::snow;
     w.thunder = !scene.render.lightning.empty();
     return w;

@@ -59,9 +59,9 @@ std::string layers_json_text(const RunListing& run, const std::vector<WeatherSum
 std::string xplane_text(const RunListing& run, const std::vector<WeatherSummary>& frames);
 std::string wpr_text(const RunListing& run, const WeatherSummary& weather);
 
-// Returns the genus of a layer: by its name, "Sc1" of a scene that was made of a report, or its models; "" where neither
-// tells.
-std::string genus_of(const Scene& scene, const LayerOptions& layer);
+// Returns the genus of a layer: that which it was given; by its name, "Sc1" of a scene that was made of a report; of its
+// veil's form or its models; "" where none tells.
+std::string genus_of(const Scene& scene, std::size_t layer);
 
 // Returns a sentence where the scene does not say how high its origin is above mean sea level, else "": heights of all
 // formats are then above the ellipsoid.
