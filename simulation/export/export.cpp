@@ -25,6 +25,7 @@
 #include "simulation/export/sequence.h"
 #include "simulation/export/weather.h"
 #include "simulation/folder_lock.h"
+#include "simulation/memory.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -118,6 +119,13 @@ void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
     throw Error(ErrorCode::io,
                 fmt::format("{}: the export takes {}, but only {} are free", folder.string(),
                             bytes_text(std::size_t(bytes)), bytes_text(std::size_t(space.available))));
+}
+
+// A sparse file may have any box, whose voxels many formats hold all.
+void require_box(const ExportOptions& options, const ExportSequence& s) {
+    require_memory(std::size_t(box_bytes(options, s)),
+                   fmt::format("{}: its box of {} x {} x {} voxels (less with a larger --voxel)",
+                               s.frames.front().file.string(), s.extent.x, s.extent.y, s.extent.z));
 }
 
 // The winds of files, each of which has its own. It is linear between moments, so that one which stays needs its first and
@@ -371,6 +379,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     if (!options.weather.empty()) run = read_run(options.source);
     ExportReport report = report_of(options, sequences);
     require_space(options.folder, report.needed_bytes);
+    for (const ExportSequence& s : sequences) require_box(options, s);
     GridReader reader(options);
     const std::vector<ListedFrame> of_weather =
         run ? frames_of_weather(options, *run) : std::vector<ListedFrame>();

@@ -209,25 +209,42 @@ void FrameExporter::write_dense(const std::filesystem::path& path, ExportFormat 
     }
 }
 
-// Each frame takes its grid, its voxels as floats, those of the box with its levels as floats, and their codes.
+std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
+    constexpr std::uint64_t kFloat = sizeof(float);
+    std::uint64_t levels = 0, passing = 0;
+    std::map<VoxelType, std::uint64_t> codes;
+    const VolumeBox box = box_of(s.extent, {}, VolumeLayout{.factor = s.layout.factor});
+    const auto voxels = std::uint64_t(box.size[0]) * std::uint64_t(box.size[1]) * std::uint64_t(box.size[2]);
+    for (const ExportFormat format : all_formats(options)) {
+        const bool is_grid = format == ExportFormat::vdb || format == ExportFormat::nvdb;
+        if (format == ExportFormat::flightgear) passing = std::max(passing, (kFloat + 1) * voxels);
+        if (is_grid && s.layout.factor > 1) passing = std::max(passing, kFloat * voxels);
+        if (!is_dense(format) && format != ExportFormat::bricks) continue;
+        std::uint64_t floats = 0;
+        for (const auto& [x, y, z] : level_sizes(s, format))
+            floats += kFloat * std::uint64_t(x) * std::uint64_t(y) * std::uint64_t(z);
+        levels = std::max(levels, floats);
+        if (!is_dense(format)) continue;
+        std::uint64_t& most = codes[type_of(options, format)];
+        most = std::max(most, dense_bytes(options, s, format));
+    }
+    for (const auto& [type, bytes] : codes) levels += bytes;
+    return levels + passing;
+}
+
+// Each frame takes its grid, its voxels as floats, and its boxes.
 std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& s) {
     constexpr std::uint64_t kMemory = std::uint64_t(256) << 20;
     constexpr int kLeafEdge = 8;  // of OpenVDB
     const std::size_t threads =
         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     if (threads <= 1) return 1;
-    std::uint64_t voxels = 1, floats = 0, codes = 0;
+    std::uint64_t voxels = 1;
     for (const int side : {s.extent.x, s.extent.y, s.extent.z})
         voxels *= std::uint64_t(side + kLeafEdge - 1) / kLeafEdge * kLeafEdge;
-    for (const ExportFormat format : all_formats(options)) {
-        if (!is_dense(format) && format != ExportFormat::flightgear) continue;
-        if (is_dense(format)) codes += dense_bytes(options, s, format);
-        for (const auto& [x, y, z] : level_sizes(s, format))
-            floats += 4 * std::uint64_t(x) * std::uint64_t(y) * std::uint64_t(z);
-    }
     const auto wind = options.velocity_name.empty() ? 0 : std::uint64_t(velocity_bytes(double(voxels)));
     return std::size_t(
-        std::clamp<std::uint64_t>(kMemory / (8 * voxels + floats + codes + wind), 1, threads + 1));
+        std::clamp<std::uint64_t>(kMemory / (8 * voxels + box_bytes(options, s) + wind), 1, threads + 1));
 }
 
 }  // namespace nephos

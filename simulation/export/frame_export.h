@@ -97,6 +97,10 @@ class FramesAtWork {
     std::deque<std::future<ExportedFrame>> frames_;
 };
 
+// Returns the memory that a frame takes beside its grid: the voxels of its box and of their levels as floats, their codes, and
+// those of coarser grids, which are dense on their way.
+std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& sequence);
+
 // Returns a frame more than there are threads to compute with, as one waits for the device most of the time; of large frames
 // as many as fit into memory; 1 with one thread.
 std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& sequence);

@@ -14,6 +14,7 @@
 #include "density/export/cloud_picture.h"
 #include "density/export/containers.h"
 #include "simulation/export/export_list.h"
+#include "simulation/memory.h"
 #include "simulation/verify_problems.h"
 
 namespace nephos {
@@ -49,8 +50,12 @@ void compare(const std::filesystem::path& path, const std::vector<float>& expect
     d.voxels += expected.size();
 }
 
-// A half is exact to its eleven bits; values are at most `scale`.
-double allowed_error(VoxelType type, double scale) { return largest_error(type) * scale * 1.0001 + 1e-7; }
+// A half is exact to its eleven bits; values are at most `scale`. On the way to a code and back there are five roundings of
+// floats.
+double allowed_error(VoxelType type, double scale) {
+    constexpr double kRoundings = 5 * 0x1p-24;
+    return (largest_error(type) * 1.0001 + kRoundings) * scale + 1e-7;
+}
 
 EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
                          const VolumeBox& box, int levels) {
@@ -81,6 +86,17 @@ bool is_at(const Placement& found, const Placement& expected) {
     return true;
 }
 
+// Throws ReadFailure unless there is room for the voxels of a box, twice, and for those on their way to one of them.
+void require_memory_to_compare(const std::filesystem::path& path, const VolumeBox& box) {
+    const auto& [nx, ny, nz] = box.size;
+    try {
+        require_memory(3 * sizeof(float) * std::size_t(nx) * std::size_t(ny) * std::size_t(nz),
+                       fmt::format("three times {} x {} x {} voxels", nx, ny, nz));
+    } catch (const Error& failure) {
+        throw ReadFailure(path, failure.what(), "compare with its source");
+    }
+}
+
 // Adds the differences of one file to its source. Returns false for what cannot be compared.
 bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
                   const ListedExport::Sequence& s, const ExportedFile& file, Difference& d) {
@@ -90,6 +106,7 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     const std::filesystem::path path = folder / file.path;
     VolumeLayout plain;
     plain.factor = s.layout.factor;
+    require_memory_to_compare(path, box_of(source.extent(), source.placement(), plain));
     if (file.format == "vdb" || file.format == "nvdb") {
         const Volume expected = lay_out(source, plain);
         const Extent extent{expected.nx, expected.ny, expected.nz};
@@ -130,6 +147,7 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     if (std::ranges::any_of(box.size, [](int side) { return side > kMostSide; }))
         bad_file(path, fmt::format("its list states a box of {} x {} x {} voxels", box.size[0], box.size[1],
                                    box.size[2]));
+    require_memory_to_compare(path, box);
     const EncodedVolume encoded = read_dense(path, file.format, type->second, box, s.levels);
     const VolumeLevel& top = encoded.levels.front();
     if (encoded.type != type->second || std::array{top.nx, top.ny, top.nz} != box.size)

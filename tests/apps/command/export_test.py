@@ -295,13 +295,15 @@ class Export(Case):
             self.assertIn("placed_0001.nvdb: 3 bytes", result.stdout + result.stderr)
         (self.folder / "run/density").chmod(0o755)
 
-    def test_genera_are_those_of_the_models(self):
+    def test_genera_are_those_of_layers_and_models(self):
         """Not of what their names begin with; clouds of no genus are cumulus, which the automaton makes."""
-        for name, genus, wanted, xplane in (("Storm", "Cb", "Cb", 3), ("Storm", "none", "", 2), ("Sc-2", "none", "Sc", 1)):
+        height = "base_height_m = 1000"
+        for name, genus, place, wanted, xplane in (("Storm", "Cb", height, "Cb", 3), ("Storm", "none", height, "", 2), ("Sc-2", "none", height, "Sc", 1),
+                                                   ("Storm", "Cu", 'genus = "Cb"', "Cb", 3), ("Storm", "none", 'genus = "St fra"', "St", 1)):
             text = (f'name = "g"\nseed = 1\n[time]\nstep_s = 10\nsteps = 60\n[frames]\nstart_s = 590\ncount = 1\n[[model]]\nname = "{name}"\ngenus = "{genus}"\n'
                     'seeds = [{ position_m = [0, 0, 300], size_m = [1500, 1500, 1000] }]\n[[sky]]\nname = "s"\nclouds = 8\nstate = 0\n'
-                    f'models = ["{name}"]\n[[layer]]\nname = "tower"\nskies = ["s"]\nbase_height_m = 1000\n'
-                    "lattice = { cells = [60, 60, 30], cell_size_m = 100, origin_m = [-3000, -3000, 900] }\n")
+                    f'models = ["{name}"]\n[[layer]]\nname = "tower"\nskies = ["s"]\n{place}\n'
+                    "lattice = { cells = [60, 60, 36], cell_size_m = 100, origin_m = [-3000, -3000, 300] }\n")
             self.call("run", self.write("g.toml", text), "--no-render", "--out", "g", "--overwrite")
             self.call("export", "g", "--to", "layers", "--to", "xplane", "-o", "summary")
             layers = json.loads(next((self.folder / "summary").glob("*.layers.json")).read_text())
@@ -320,6 +322,31 @@ class Export(Case):
             shutil.rmtree(self.folder / "large", ignore_errors=True)
         self.call("export", "large.vdb", "--to", "raw", "--type", "r16f", "--range", "auto", "-o", "large")
         self.call("verify", "large")
+
+    def test_boxes_beyond_the_memory(self):
+        """Two voxels far apart: what holds all between them is refused before it is made, and a grid of them is not compared."""
+        import pyopenvdb
+        grid = pyopenvdb.FloatGrid()
+        for place in ((0, 0, 0), (15999, 15999, 15999)):
+            grid.getAccessor().setValueOn(place, 0.5)
+        grid.name = "density"
+        pyopenvdb.write(str(self.folder / "apart.vdb"), [grid])
+        for arguments in (["--to", "flightgear"], ["--to", "nvdb", "--voxel", "2"], ["--to", "vdb", "--voxel", "2"]):
+            self.refused(2, "export", "apart.vdb", *arguments, "-o", "apart", says="apart.vdb: its box of 16000 x 16000 x 16000 voxels")
+            self.assertFalse((self.folder / "apart").exists())
+        self.call("export", "apart.vdb", "--to", "vdb", "-o", "apart")
+        said = self.call("verify", "apart", status=3).stderr
+        self.assertIn("nothing is wrong, but the check `decoding` could not be done", said)
+
+    def test_values_above_one_are_verified(self):
+        """In 16 bits, whose steps are hardly larger than what is rounded on the way to a code and back."""
+        import pyopenvdb
+        grid = pyopenvdb.FloatGrid()
+        grid.copyFromArray((numpy.random.default_rng(1).random((20, 20, 20)) * 100).astype("f4"))
+        grid.name = "density"
+        pyopenvdb.write(str(self.folder / "hundred.vdb"), [grid])
+        self.call("export", "hundred.vdb", "--to", "raw", "--to", "vti", "--type", "r16", "--range", "auto", "-o", "hundred")
+        self.call("verify", "hundred")
 
     def test_sidecar_keeps_its_schema_and_the_example_reads_it(self):
         import jsonschema
@@ -612,6 +639,9 @@ class Export(Case):
         self.assertGreater(len(names), 1)
         for name in names:
             self.assertEqual((apart / name).read_bytes(), (both / name).read_bytes(), name)
+        for path in (self.folder / "run/density").glob("*.vdb"):
+            path.unlink()
+        self.assertEqual((self.export("gone", *formats) / "layered.layers.json").read_bytes(), (both / "layered.layers.json").read_bytes())
         self.call("run", self.write("layered.toml", LAYERED.replace("[density]\n", "[density]\nper_layer = false\n")), "--no-render", "--out", "run", "--overwrite")
         self.refused(2, "export", "run", *formats, "-o", "none", says="layer 'low' has no density files")
         self.assertFalse((self.folder / "none").exists())
