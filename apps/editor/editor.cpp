@@ -224,12 +224,11 @@ void update_title(Editor& editor, std::string& shown) {
 }
 
 // Returns the exit status.
-int loop(Editor& editor, Script& script, Report& report) {
+int loop(Editor& editor, Script& script, Report& report, bool& screenshot_due) {
     const bool scripted = !editor.options.script.empty();
     std::string title;
     Clock::time_point last_frame = Clock::now(), last_input = Clock::now(), last_results;
     Capture capture;
-    bool screenshot_due = !editor.options.screenshot.empty();
     std::vector<std::filesystem::path> dropped;
     while (!editor.quit) {
         if (const int signal = pending_signal(); signal != 0) {
@@ -460,8 +459,9 @@ int run_editor(const EditorOptions& options) {
     if (editor.document->has_file()) note_recent(editor.settings, editor.document->path());
     if (options.screenshot.empty()) editor.left_autosaves = editor.document->left_autosaves(editor.folder);
     int status = 0;
+    bool screenshot_due = !options.screenshot.empty();
     try {
-        status = loop(editor, script, report);
+        status = loop(editor, script, report, screenshot_due);
     } catch (const Error& error) {
         const std::string kept = kept_edits(editor);
         if (kept.empty()) throw;
@@ -484,7 +484,10 @@ int run_editor(const EditorOptions& options) {
     keep_settings(editor);
     if (!failure.empty()) throw Error(ErrorCode::io, failure);
     script.require_read();
-    if (!options.screenshot.empty() && !editor.picture) {
+    if (!editor.capture_to.empty() && !editor.capture_by_user)
+        throw Error(ErrorCode::check,
+                    editor.capture_to.string() + ": was not saved: the editor had ended before");
+    if (!options.screenshot.empty() && (screenshot_due || !editor.picture)) {
         if (!editor.document->problems().empty()) throw SceneErrors(editor.document->problems());
         const std::string failed = editor.live->status().failure;
         throw Error(ErrorCode::io, failed.empty() ? options.screenshot.string() +

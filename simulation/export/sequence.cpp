@@ -410,7 +410,10 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
             layers.clear();
             for (const LayerOptions& layer : run.scene.layers)
                 if (has_density(layer)) layers.emplace_back(layer.name);
-            if (layers.empty()) throw Error(ErrorCode::usage, "the scene has no layers with a density");
+            if (layers.empty())
+                throw Error(ErrorCode::usage, options.layer == "each"
+                                                  ? "--layer each: the scene has no layers"
+                                                  : "the scene has no layers with a density");
         } else if (options.layer == "all") {
             layers = {std::nullopt};
         }
