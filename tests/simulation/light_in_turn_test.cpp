@@ -117,7 +117,7 @@ TEST_F(LightInTurn, AFolderThatGoesWhileCloudsAreDrawnEndsTheRun) {
     for (const int last : {1, 2, 3}) {
         RunSettings gone = settings_of(read_scene_text(many, "many.toml"), "gone" + std::to_string(last));
         const auto rename = [&](const RunProgress& progress) {
-            if (progress.frames == last && fs::exists(gone.folder))
+            if (progress.frames >= last && fs::exists(gone.folder))  // some are never told on a busy machine
                 fs::rename(gone.folder, gone.folder.string() + " elsewhere");
         };
         try {
