@@ -290,21 +290,58 @@ std::vector<float> DensityGrid::to_dense() const {
     return dense;
 }
 
+namespace {
+
+std::array<int, 3> low_of(const Block& block) {
+    return {block.origin.x(), block.origin.y(), block.origin.z()};
+}
+
+std::array<int, 3> size_of(const Block& block, Extent extent) {
+    return {std::min(kBlock, extent.x - block.origin.x()), std::min(kBlock, extent.y - block.origin.y()),
+            std::min(kBlock, extent.z - block.origin.z())};
+}
+
+using BlockValues = std::array<float, kBlockVoxels>;
+
+// The values of a block inside of the extent, x fastest.
+std::span<const float> values_of(const Block& block, Extent extent, BlockValues& values) {
+    const auto [nx, ny, nz] = size_of(block, extent);
+    std::size_t at = 0;
+    for (int k = 0; k < nz; ++k)
+        for (int j = 0; j < ny; ++j)
+            for (int i = 0; i < nx; ++i) values[at++] = block.value(leaf_offset(i, j, k));
+    return std::span(values).first(at);
+}
+
+}  // namespace
+
 void DensityGrid::visit_blocks(const std::function<void(const VoxelBlock&)>& visit) const {
     const Extent extent = impl_->extent;
-    std::array<float, kBlockVoxels> values{};
-    for (const Block& block : blocks_of(*this)) {
-        const std::array<int, 3> low{block.origin.x(), block.origin.y(), block.origin.z()};
-        const std::array<int, 3> size{std::min(kBlock, extent.x - low[0]),
-                                      std::min(kBlock, extent.y - low[1]),
-                                      std::min(kBlock, extent.z - low[2])};
-        std::size_t at = 0;
-        for (int k = 0; k < size[2]; ++k)
-            for (int j = 0; j < size[1]; ++j)
-                for (int i = 0; i < size[0]; ++i)
-                    values[at++] =
-                        block.leaf ? block.leaf->buffer().data()[leaf_offset(i, j, k)] : block.tile;
-        visit({low, size, std::span(values).first(at)});
+    BlockValues values{};
+    for (const Block& block : blocks_of(*this))
+        visit({low_of(block), size_of(block, extent), values_of(block, extent, values)});
+}
+
+void DensityGrid::visit_blocks(
+    const DensityGrid& other,
+    const std::function<void(std::span<const float>, std::span<const float>)>& visit) const {
+    const Extent extent = impl_->extent;
+    if (!(other.extent() == extent))
+        throw Error(ErrorCode::usage, "grids of different extents have no blocks in common");
+    const std::vector<Block> ours = blocks_of(*this), others = blocks_of(other);
+    BlockValues values{}, other_values{};
+    const BlockValues zeros{};
+    for (auto a = ours.begin(), b = others.begin(); a != ours.end() || b != others.end();) {
+        const bool is_ours =
+            b == others.end() || (a != ours.end() && block_order(a->origin) <= block_order(b->origin));
+        const bool is_others =
+            a == ours.end() || (b != others.end() && block_order(b->origin) <= block_order(a->origin));
+        std::span<const float> of_ours, of_others;
+        if (is_ours) of_ours = values_of(*a++, extent, values);
+        if (is_others) of_others = values_of(*b++, extent, other_values);
+        const std::span<const float> none =
+            std::span(zeros).first(std::max(of_ours.size(), of_others.size()));
+        visit(is_ours ? of_ours : none, is_others ? of_others : none);
     }
 }
 

@@ -68,6 +68,10 @@ class DensityGrid {
     // Calls `visit` for each block of 8 x 8 x 8 voxels that has a value above 0, smaller at the far sides of the extent, one
     // after the other: without room for the whole box.
     void visit_blocks(const std::function<void(const VoxelBlock&)>& visit) const;
+    // Calls `visit` for each such block in which this grid or another of the same extent has a value above 0, with the values
+    // of both.
+    void visit_blocks(const DensityGrid& other,
+                      const std::function<void(std::span<const float>, std::span<const float>)>& visit) const;
     // Returns the bytes that the voxels and the tree above them take.
     std::size_t memory_bytes() const;
 

@@ -25,7 +25,17 @@ struct Entry {
     float min = 0, max = 0;
 };
 
+// Codes precede the table's end in time and follow it in the file: those of the first bricks are kept, others are made again
+// when they are written.
+constexpr std::size_t kMostKept = std::size_t(16) << 20;
+
 int bricks_along(int voxels, int edge) { return (voxels + edge - 1) / edge; }
+
+std::uint64_t brick_count(const std::array<int, 3>& size, int edge) {
+    std::uint64_t bricks = 1;
+    for (const int voxels : size) bricks *= std::uint64_t(bricks_along(voxels, edge));
+    return bricks;
+}
 
 // Places of the voxels of a brick along an axis of the level, -1 where there is none.
 std::vector<int> places(int first, int edge, int voxels, bool periodic) {
@@ -91,11 +101,19 @@ std::pair<float, float> range_of(const std::vector<float>& values) {
 std::uint64_t most_brick_bytes(const std::vector<std::array<int, 3>>& sizes, int edge, VoxelType type) {
     const int side = edge + 2 * kBorder;
     std::uint64_t bytes = kHeadBytes;
-    for (const std::array<int, 3>& size : sizes) {
-        std::uint64_t bricks = 1;
-        for (const int voxels : size) bricks *= std::uint64_t(bricks_along(voxels, edge));
-        bytes += kLevelBytes + bricks * (kEntryBytes + encoded_bytes(side, side, side, type));
-    }
+    for (const std::array<int, 3>& size : sizes)
+        bytes +=
+            kLevelBytes + brick_count(size, edge) * (kEntryBytes + encoded_bytes(side, side, side, type));
+    return bytes;
+}
+
+std::uint64_t brick_work_bytes(const std::vector<std::array<int, 3>>& sizes, int edge) {
+    // A vector that grows takes its old room and, twice as large, the new one.
+    constexpr std::uint64_t kGrowing = 3,
+                            kOfBrick =
+                                kGrowing * (sizeof(Entry) + sizeof(std::vector<std::byte>) + kEntryBytes);
+    std::uint64_t bytes = kMostKept;
+    for (const std::array<int, 3>& size : sizes) bytes += kOfBrick * brick_count(size, edge);
     return bytes;
 }
 
@@ -104,9 +122,6 @@ void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
     if (options.type == VoxelType::bc4)
         throw Error(ErrorCode::usage, "--type bc4: bricks with a border have r8, r16, r16f or r32f");
     std::vector<Entry> entries;
-    // Codes precede the table's end in time and follow it in the file: those of the first bricks are kept, others are made
-    // again when they are written.
-    constexpr std::size_t kMostKept = std::size_t(16) << 20;
     std::size_t kept = 0;
     std::vector<std::vector<std::byte>> data;
     for (std::size_t n = 0; n < levels.size(); ++n) {
@@ -189,7 +204,7 @@ std::uint64_t most_voxel_bytes(std::size_t file_bytes) {
     return kAlways + kRatio * file_bytes;
 }
 
-Head read_head(ByteReader& reader, std::size_t file_bytes) {
+Head read_head(ByteReader& reader, std::size_t file_bytes, std::uint64_t known_bytes) {
     Head head;
     if (reader.get<std::uint64_t>() != kMark) bad("is no file of bricks");
     const auto type = reader.get<std::uint32_t>(), edge = reader.get<std::uint32_t>(),
@@ -202,17 +217,16 @@ Head read_head(ByteReader& reader, std::size_t file_bytes) {
     std::uint64_t bytes = 0;
     for (std::uint32_t n = 0; n < levels; ++n) {
         std::array<int, 3> size{};
-        std::uint64_t bricks = 1;
         for (int& voxels : size) {
             const auto stated = reader.get<std::uint32_t>();
-            if (stated == 0 || stated > 1u << 16) bad("its sizes are impossible");
+            if (stated == 0 || stated > 1u << 20) bad("its sizes are impossible");
             voxels = int(stated);
-            bricks *= std::uint64_t(bricks_along(voxels, head.edge));
         }
+        const std::uint64_t bricks = brick_count(size, head.edge);
         if (bricks > file_bytes / kEntryBytes) bad("its sizes are impossible");
         head.bricks += bricks;
         bytes += encoded_bytes(size[0], size[1], size[2], head.volume.type);
-        if (bytes > most_voxel_bytes(file_bytes))
+        if (bytes > std::max(known_bytes, most_voxel_bytes(file_bytes)))
             bad("its sizes take " + std::to_string(bytes) + " bytes of memory, too many for a file of " +
                 std::to_string(file_bytes));
         head.volume.levels.push_back({size[0], size[1], size[2], {}});
@@ -259,10 +273,10 @@ void place_brick(const Entry& entry, std::span<const std::byte> brick, int edge,
 
 }  // namespace
 
-EncodedVolume read_bricks(const std::filesystem::path& path) {
-    return with_whole_file(path, [](ByteReader& reader) {
+EncodedVolume read_bricks(const std::filesystem::path& path, std::uint64_t known_bytes) {
+    return with_whole_file(path, [known_bytes](ByteReader& reader) {
         const std::span<const std::byte> file = reader.rest();
-        Head head = read_head(reader, file.size());
+        Head head = read_head(reader, file.size(), known_bytes);
         const std::size_t voxel = encoded_bytes(1, 1, 1, head.volume.type),
                           side = std::size_t(head.edge) + 2 * kBorder;
         for (std::uint64_t n = 0; n < head.bricks; ++n) {

@@ -19,6 +19,7 @@
 // opposite side on axes that repeat. Files are complete or absent; functions throw Error(io) naming the file.
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 
@@ -39,10 +40,13 @@ void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
                   const BrickOptions& options);
 
 // Returns the levels put together from the bricks. A file whose levels take more than 256 MiB and 2,000 times its own bytes
-// is refused before memory is taken.
-EncodedVolume read_bricks(const std::filesystem::path& path);
+// is refused before memory is taken, unless they take no more than it is known to hold.
+EncodedVolume read_bricks(const std::filesystem::path& path, std::uint64_t known_bytes = 0);
 
 // Returns the most bytes that a file of these levels takes.
 std::uint64_t most_brick_bytes(const std::vector<std::array<int, 3>>& sizes, int edge, VoxelType type);
+
+// Returns the most memory that write_bricks() takes beside the levels.
+std::uint64_t brick_work_bytes(const std::vector<std::array<int, 3>>& sizes, int edge);
 
 }  // namespace nephos

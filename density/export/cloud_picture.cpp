@@ -142,6 +142,11 @@ CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& perio
     return cloud;
 }
 
+std::uint64_t largest_cloud_bytes(std::uint64_t voxels, std::uint64_t positive) {
+    // Marks; and members in vectors, which take their old room and, twice as large, the new one while they grow.
+    return voxels * sizeof(std::uint8_t) + 3 * sizeof(Member) * positive;
+}
+
 void write_cloud_picture(const std::filesystem::path& path, const CloudVoxels& cloud, double type) {
     const auto side = std::size_t(cloud.side), width = side * std::size_t(cloud.height);
     const auto green = std::uint8_t(std::lround(255 * std::clamp(type, 0.0, 1.0)));

@@ -75,7 +75,8 @@ Volume lay_out(const DensityGrid& density, const VolumeLayout& layout) {
     const std::size_t first = std::size_t(box.border) * (stride[0] + stride[1] + stride[2]);
     const Extent extent = density.extent();
     const int f = layout.factor;
-    const float weight = 1.0f / (float(f) * float(f) * float(f));
+    // Of values of one cloud that are alike sums of floats would go astray, and end where the next value is below their last bit.
+    std::vector<double> sums(f == 1 ? 0 : volume.voxels());
     for (const Block& block : blocks_of(density)) {
         if (f == 1) {
             block.copy_to(volume.values.data() + first, stride, extent);
@@ -84,14 +85,15 @@ Volume lay_out(const DensityGrid& density, const VolumeLayout& layout) {
         const int x = block.origin.x(), y = block.origin.y(), z = block.origin.z();
         for (int i = 0; i < std::min(kBlock, extent.x - x); ++i) {
             for (int j = 0; j < std::min(kBlock, extent.y - y); ++j) {
-                float* column = volume.values.data() + first + std::size_t((x + i) / f) * stride[0] +
-                                std::size_t((y + j) / f) * stride[1];
+                double* column = sums.data() + first + std::size_t((x + i) / f) * stride[0] +
+                                 std::size_t((y + j) / f) * stride[1];
                 for (int k = 0; k < std::min(kBlock, extent.z - z); ++k)
-                    column[std::size_t((z + k) / f) * stride[2]] +=
-                        weight * block.value(leaf_offset(i, j, k));
+                    column[std::size_t((z + k) / f) * stride[2]] += double(block.value(leaf_offset(i, j, k)));
             }
         }
     }
+    const double cells = double(f) * f * f;
+    for (std::size_t n = 0; n < sums.size(); ++n) volume.values[n] = float(sums[n] / cells);
     if (layout.border == Border::wrap) {
         for (int a = 0; a < 3; ++a) {
             const int inner = box.size[std::size_t(a)] - box.padding[std::size_t(a)] - 2;
@@ -99,6 +101,16 @@ Volume lay_out(const DensityGrid& density, const VolumeLayout& layout) {
         }
     }
     return volume;
+}
+
+DensityGrid coarser(const DensityGrid& density, int factor) {
+    if (factor == 1) return density;
+    VolumeLayout layout;
+    layout.factor = factor;
+    const Volume volume = lay_out(density, layout);
+    Placement placement = density.placement();
+    placement.cell_size_m *= factor;
+    return DensityGrid::from_dense(volume.values, {volume.nx, volume.ny, volume.nz}, placement);
 }
 
 Volume halved(const Volume& volume) {

@@ -58,12 +58,27 @@ struct VolumeBox {
     std::array<double, 3> min_m{},
         max_m{};                       // corners of the box, border and padding included; world coordinates
     std::array<int, 3> axis{0, 1, 2};  // the world's axis (0 east) behind each of the file's
+
+    std::uint64_t voxels() const {
+        return std::uint64_t(size[0]) * std::uint64_t(size[1]) * std::uint64_t(size[2]);
+    }
 };
 
 VolumeBox box_of(Extent extent, const Placement& placement, const VolumeLayout& layout);
 
-// Fills the box. A voxel of several of the grid has their mean, so that the mass stays. Memory: the result alone.
+// Returns the memory that lay_out() takes for a box of so many voxels: a float for each, and a sum where there are several cells
+// in one.
+constexpr std::uint64_t layout_bytes(std::uint64_t voxels, int factor) {
+    return voxels * (sizeof(float) + (factor > 1 ? sizeof(double) : 0));
+}
+
+// Fills the box. A voxel of several of the grid has their mean, so that the mass stays, at most their largest. Memory:
+// layout_bytes().
 Volume lay_out(const DensityGrid& density, const VolumeLayout& layout);
+
+// Returns the grid of voxels `factor` times as large, which are means; takes layout_bytes() of them on the way,
+// unless the factor is 1. Pure.
+DensityGrid coarser(const DensityGrid& density, int factor);
 
 // Returns the next level: means of 2 x 2 x 2 voxels. Precondition: even sizes, or 1.
 Volume halved(const Volume& volume);

@@ -17,6 +17,7 @@
 #include "density/combine.h"
 #include "density/export/bricks.h"
 #include "density/export/cloud_picture.h"
+#include "simulation/memory.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -28,20 +29,14 @@ std::string_view name_of(ExportFormat format) {
     return {};
 }
 
-// The grid as VDB files hold it: coarser if the options want that.
-DensityGrid grid_of(const DensityGrid& density, int factor) {
-    if (factor == 1) return density;
-    VolumeLayout layout;
-    layout.factor = factor;
-    const Volume volume = lay_out(density, layout);
-    Placement placement = density.placement();
-    placement.cell_size_m *= factor;
-    return DensityGrid::from_dense(volume.values, {volume.nx, volume.ny, volume.nz}, placement);
+// Voxels of the box, coarser if the options want that, without border and padding.
+std::uint64_t voxels_of(const ExportSequence& s) {
+    return box_of(s.extent, {}, VolumeLayout{.factor = s.layout.factor}).voxels();
 }
 
 void write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s,
                     const LoadedDensity& loaded, double time_s) {
-    const DensityGrid density = grid_of(loaded.density, s.layout.factor);
+    const DensityGrid density = coarser(loaded.density, s.layout.factor);
     VdbContent content;
     VdbMetadata metadata = loaded.metadata.value_or(VdbMetadata{});
     if (!loaded.metadata) metadata.nephos_version = version();
@@ -73,7 +68,8 @@ bool is_copy(const ExportOptions& options, const ExportSequence& s, const Source
 }
 
 std::vector<Volume> levels_of(const DensityGrid& density, const ExportSequence& s) {
-    std::vector<Volume> levels{lay_out(density, s.layout)};
+    std::vector<Volume> levels;  // not from a list, whose elements would be copied
+    levels.push_back(lay_out(density, s.layout));
     for (int n = 1; n < s.levels; ++n) levels.push_back(halved(levels.back()));
     return levels;
 }
@@ -111,8 +107,7 @@ void require_halves(const ExportOptions& options, const ExportSequence& s, const
     for (const ExportFormat format : all_formats(options)) {
         const bool is_vdb = format == ExportFormat::vdb;
         const bool halves = is_vdb ? options.type == VoxelType::r16f
-                                   : (is_dense(format) || format == ExportFormat::bricks) &&
-                                         type_of(options, format) == VoxelType::r16f;
+                                   : is_dense(format) && type_of(options, format) == VoxelType::r16f;
         if (!halves || !(largest > kLargestHalf * (is_vdb ? 1 : s.scale))) continue;
         throw Error(
             ErrorCode::usage,
@@ -169,12 +164,16 @@ void FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
     if (format == ExportFormat::flightgear) {
         VolumeLayout layout;
         layout.factor = s.layout.factor;
+        const std::uint64_t voxels = voxels_of(s);
+        require_memory(layout_bytes(voxels, s.layout.factor) +
+                           largest_cloud_bytes(voxels, loaded.density.active_voxels()),
+                       frame.file.string() + ": to find its largest cloud");
         return write_cloud_picture(path,
                                    largest_cloud(lay_out(loaded.density, layout), s.layout.periodic, s.scale),
                                    billows_of(s.genus));
     }
     if (format == ExportFormat::nvdb)
-        return write_nanovdb(path, grid_of(loaded.density, s.layout.factor),
+        return write_nanovdb(path, coarser(loaded.density, s.layout.factor),
                              options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
     if (made.levels.empty()) made.levels = levels_of(loaded.density, s);
     const VoxelType type = type_of(options_, format);
@@ -210,31 +209,39 @@ void FrameExporter::write_dense(const std::filesystem::path& path, ExportFormat 
 }
 
 std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
-    constexpr std::uint64_t kFloat = sizeof(float);
     std::uint64_t levels = 0, passing = 0;
     std::map<VoxelType, std::uint64_t> codes;
-    const VolumeBox box = box_of(s.extent, {}, VolumeLayout{.factor = s.layout.factor});
-    const auto voxels = std::uint64_t(box.size[0]) * std::uint64_t(box.size[1]) * std::uint64_t(box.size[2]);
+    const std::uint64_t voxels = voxels_of(s);
     for (const ExportFormat format : all_formats(options)) {
         const bool is_grid = format == ExportFormat::vdb || format == ExportFormat::nvdb;
-        if (format == ExportFormat::flightgear) passing = std::max(passing, (kFloat + 1) * voxels);
-        if (is_grid && s.layout.factor > 1) passing = std::max(passing, kFloat * voxels);
-        if (!is_dense(format) && format != ExportFormat::bricks) continue;
-        std::uint64_t floats = 0;
-        for (const auto& [x, y, z] : level_sizes(s, format))
-            floats += kFloat * std::uint64_t(x) * std::uint64_t(y) * std::uint64_t(z);
-        levels = std::max(levels, floats);
+        if (format == ExportFormat::flightgear)
+            passing =
+                std::max(passing, layout_bytes(voxels, s.layout.factor) + largest_cloud_bytes(voxels, 0));
+        if (is_grid && s.layout.factor > 1)
+            passing = std::max(passing, layout_bytes(voxels, s.layout.factor));
         if (!is_dense(format)) continue;
+        const std::vector<std::array<int, 3>> sizes = level_sizes(s, format);
+        std::uint64_t floats = 0;
+        for (const auto& [x, y, z] : sizes)
+            floats += sizeof(float) * std::uint64_t(x) * std::uint64_t(y) * std::uint64_t(z);
+        levels = std::max(levels, floats);
+        if (format == ExportFormat::bricks) {  // keeps no codes of all voxels
+            passing = std::max(passing, brick_work_bytes(sizes, options.brick_edge));
+            continue;
+        }
         std::uint64_t& most = codes[type_of(options, format)];
         most = std::max(most, dense_bytes(options, s, format));
     }
     for (const auto& [type, bytes] : codes) levels += bytes;
+    const std::uint64_t top = box_of(s.extent, s.placement, s.layout).voxels();
+    if (levels > 0) levels = std::max(levels, layout_bytes(top, s.layout.factor));
     return levels + passing;
 }
 
 // Each frame takes its grid, its voxels as floats, and its boxes.
 std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& s) {
-    constexpr std::uint64_t kMemory = std::uint64_t(256) << 20;
+    const std::uint64_t memory =
+        std::min<std::uint64_t>(std::uint64_t(256) << 20, available_memory().bytes / 2);
     constexpr int kLeafEdge = 8;  // of OpenVDB
     const std::size_t threads =
         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
@@ -244,7 +251,7 @@ std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& s
         voxels *= std::uint64_t(side + kLeafEdge - 1) / kLeafEdge * kLeafEdge;
     const auto wind = options.velocity_name.empty() ? 0 : std::uint64_t(velocity_bytes(double(voxels)));
     return std::size_t(
-        std::clamp<std::uint64_t>(kMemory / (8 * voxels + box_bytes(options, s) + wind), 1, threads + 1));
+        std::clamp<std::uint64_t>(memory / (8 * voxels + box_bytes(options, s) + wind), 1, threads + 1));
 }
 
 }  // namespace nephos

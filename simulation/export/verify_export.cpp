@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <new>
 #include <set>
+#include <span>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -31,6 +33,14 @@ struct Difference {
     throw Error(ErrorCode::io, path.string() + ": " + what);
 }
 
+// The differences of one file, none of which may be above `allowed`.
+void add(double largest, double allowed, std::size_t voxels, Difference& d) {
+    d.largest = std::max(d.largest, largest);
+    d.allowed = std::max(d.allowed, allowed);
+    d.passed = d.passed && largest <= allowed;
+    d.voxels += voxels;
+}
+
 // `most` is the greatest value that the type holds: greater ones of the source are it in the file.
 void compare(const std::filesystem::path& path, const std::vector<float>& expected,
              const std::vector<float>& found, double allowed, Difference& d,
@@ -44,23 +54,59 @@ void compare(const std::filesystem::path& path, const std::vector<float>& expect
         largest = std::max(largest, difference);
         d.squares += difference * difference;
     }
-    d.largest = std::max(d.largest, largest);
-    d.allowed = std::max(d.allowed, allowed);
-    d.passed = d.passed && largest <= allowed;
-    d.voxels += expected.size();
+    add(largest, allowed, expected.size(), d);
 }
 
-// A half is exact to its eleven bits; values are at most `scale`. On the way to a code and back there are five roundings of
-// floats.
+// Grids of the same extent, without room for the voxels between their clouds.
+void compare(const DensityGrid& expected, const DensityGrid& found, double allowed, Difference& d) {
+    double largest = 0;
+    expected.visit_blocks(found, [&](std::span<const float> a, std::span<const float> b) {
+        for (std::size_t n = 0; n < a.size(); ++n) {
+            const double difference = std::abs(double(a[n]) - double(b[n]));
+            largest = std::max(largest, difference);
+            d.squares += difference * difference;
+        }
+    });
+    add(largest, allowed, expected.extent().cells(), d);
+}
+
+// On the way to a code and back there are five roundings of floats.
+constexpr double kRoundings = 5 * 0x1p-24;
+
+// A half is exact to its eleven bits; values are at most `scale`.
 double allowed_error(VoxelType type, double scale) {
-    constexpr double kRoundings = 5 * 0x1p-24;
     return (largest_error(type) * 1.0001 + kRoundings) * scale + 1e-7;
+}
+
+// Throws ReadFailure unless there is room for what a comparison takes.
+void require_room(const std::filesystem::path& path, std::uint64_t bytes, const VolumeBox& box) {
+    const auto& [nx, ny, nz] = box.size;
+    try {
+        require_memory(std::size_t(bytes),
+                       fmt::format("what {} x {} x {} voxels are compared in", nx, ny, nz));
+    } catch (const Error& failure) {
+        throw ReadFailure(path, failure.what(), "compare with its source");
+    }
+}
+
+std::uint64_t codes_bytes(const VolumeBox& box, VoxelType type, int levels) {
+    std::uint64_t bytes = 0;
+    std::array<int, 3> size = box.size;
+    for (int n = 0; n < levels; ++n) {
+        bytes += encoded_bytes(size[0], size[1], size[2], type);
+        for (int& side : size) side = std::max(1, side / 2);
+    }
+    return bytes;
 }
 
 EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
                          const VolumeBox& box, int levels) {
     const auto& [nx, ny, nz] = box.size;
-    if (format == "bricks") return read_bricks(path);
+    if (format == "bricks") {  // a small file may have many voxels
+        const std::uint64_t bytes = codes_bytes(box, type, levels);
+        require_room(path, bytes, box);
+        return read_bricks(path, bytes);
+    }
     if (format == "raw") return read_raw(path, type, nx, ny, nz, levels);
     if (format == "dds") return read_dds(path);
     if (format == "ktx2") return read_ktx2(path);
@@ -71,7 +117,8 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
 // Half a step of the codes of a leaf, which go from its least to its greatest value. The box has zeros, too.
 double allowed_error(NanoQuantise quantise, const DensityGrid& source) {
     if (quantise == NanoQuantise::none) return allowed_error(VoxelType::r32f, 1);
-    return double(source.max_value()) / (quantise == NanoQuantise::fp8 ? 255 : 65535) / 2 * 1.001 + 1e-6;
+    const double half_step = 1.001 / (quantise == NanoQuantise::fp8 ? 255 : 65535) / 2;
+    return double(source.max_value()) * (half_step + kRoundings) + 1e-6;
 }
 
 // Returns whether a grid lies where it should, but for the rounding of the centre of its first voxel, which is what files hold.
@@ -86,17 +133,6 @@ bool is_at(const Placement& found, const Placement& expected) {
     return true;
 }
 
-// Throws ReadFailure unless there is room for the voxels of a box, twice, and for those on their way to one of them.
-void require_memory_to_compare(const std::filesystem::path& path, const VolumeBox& box) {
-    const auto& [nx, ny, nz] = box.size;
-    try {
-        require_memory(3 * sizeof(float) * std::size_t(nx) * std::size_t(ny) * std::size_t(nz),
-                       fmt::format("three times {} x {} x {} voxels", nx, ny, nz));
-    } catch (const Error& failure) {
-        throw ReadFailure(path, failure.what(), "compare with its source");
-    }
-}
-
 // Adds the differences of one file to its source. Returns false for what cannot be compared.
 bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
                   const ListedExport::Sequence& s, const ExportedFile& file, Difference& d) {
@@ -106,15 +142,15 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     const std::filesystem::path path = folder / file.path;
     VolumeLayout plain;
     plain.factor = s.layout.factor;
-    require_memory_to_compare(path, box_of(source.extent(), source.placement(), plain));
+    const VolumeBox cells = box_of(source.extent(), source.placement(), plain);
+    const std::uint64_t laid_out = layout_bytes(cells.voxels(), s.layout.factor);
     if (file.format == "vdb" || file.format == "nvdb") {
-        const Volume expected = lay_out(source, plain);
-        const Extent extent{expected.nx, expected.ny, expected.nz};
-        Placement at = source.placement();
-        at.cell_size_m *= s.layout.factor;
+        if (s.layout.factor > 1) require_room(path, laid_out, cells);
+        const DensityGrid expected = coarser(source, s.layout.factor);
+        Placement at = expected.placement();
         if (file.format == "nvdb") {
-            compare(path, expected.values, read_nanovdb(path, extent, at).to_dense(),
-                    allowed_error(list.quantise, source), d);
+            compare(expected, read_nanovdb(path, expected.extent(), at), allowed_error(list.quantise, source),
+                    d);
             return true;
         }
         const LoadedDensity loaded = load_density(path);
@@ -125,13 +161,15 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
             for (int a = 0; a < 3; ++a) at.origin_m[a] -= at.cell_size_m / 2;
         if (!is_at(found.placement(), at)) bad_file(path, "lies at another place than its source");
         const auto type = list.types.find(file.format);
-        compare(path, expected.values, found.to_dense(),
+        if (!(found.extent() == expected.extent())) bad_file(path, "has another size than its source");
+        compare(expected, found,
                 allowed_error(type == list.types.end() ? VoxelType::r32f : type->second,
                               std::max(1.0f, source.max_value())),
                 d);
         return true;
     }
     if (file.format == "flightgear") {
+        require_room(path, laid_out + largest_cloud_bytes(cells.voxels(), source.active_voxels()), cells);
         const CloudVoxels expected = largest_cloud(lay_out(source, plain), s.layout.periodic, s.scale),
                           found = read_cloud_picture(path);
         if (found.side != expected.side || found.height != expected.height)
@@ -147,7 +185,6 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     if (std::ranges::any_of(box.size, [](int side) { return side > kMostSide; }))
         bad_file(path, fmt::format("its list states a box of {} x {} x {} voxels", box.size[0], box.size[1],
                                    box.size[2]));
-    require_memory_to_compare(path, box);
     const EncodedVolume encoded = read_dense(path, file.format, type->second, box, s.levels);
     const VolumeLevel& top = encoded.levels.front();
     if (encoded.type != type->second || std::array{top.nx, top.ny, top.nz} != box.size)
@@ -155,6 +192,9 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     const bool one_level = file.format == "vti" || file.format == "slices";
     if (encoded.levels.size() != std::size_t(one_level ? 1 : s.levels))
         bad_file(path, "has another number of levels than the list says");
+    // Voxels of the source, and afterwards beside them those of the codes.
+    require_room(
+        path, std::max(2 * sizeof(float) * box.voxels(), layout_bytes(box.voxels(), s.layout.factor)), box);
     Volume expected = lay_out(source, s.layout);
     const bool whole = encoded.type == VoxelType::r16f || encoded.type == VoxelType::r32f;
     const float most = whole ? std::max(s.scale, source.max_value()) : s.scale;
@@ -189,6 +229,8 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
             changed += is_changed;
         } catch (const ReadFailure& failure) {  // which says nothing of its content
             unread.add(failure.what());
+        } catch (const std::bad_alloc&) {
+            unread.add((folder / file.path).string() + ": cannot compare with its source: out of memory");
         } catch (const Error& failure) {
             const bool is_bad = is_of_file(folder / file.path, failure);
             if (!is_bad && !is_of_file(folder / file.source, failure)) throw;

@@ -4,10 +4,14 @@
 
 #include "density/density_grid.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
 #include <set>
+#include <span>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -24,6 +28,47 @@ std::vector<float> random_values(Extent extent, std::uint64_t seed) {
     std::vector<float> values(extent.cells());
     for (float& v : values) v = random() % 2 ? 0.0f : float(random() % 1000 + 1) / 1000.0f;
     return values;
+}
+
+TEST(DensityGrid, VisitsTheBlocksOfTwoGrids) {
+    constexpr Extent kExtent{21, 30, 17};
+    for (const std::uint64_t seed : {1u, 2u, 3u}) {
+        // Each has half of the blocks, of which some are of one value.
+        std::array<std::vector<float>, 2> values{random_values(kExtent, seed),
+                                                 random_values(kExtent, seed + 9)};
+        for (std::size_t of = 0; of < 2; ++of) {
+            std::mt19937_64 random(seed + 20 + of);
+            for (int z = 0; z < kExtent.z; z += 8)
+                for (int y = 0; y < kExtent.y; y += 8)
+                    for (int x = 0; x < kExtent.x; x += 8) {
+                        const auto kind = random() % 4;
+                        if (kind < 2) continue;
+                        for (int k = z; k < std::min(z + 8, kExtent.z); ++k)
+                            for (int j = y; j < std::min(y + 8, kExtent.y); ++j)
+                                for (int i = x; i < std::min(x + 8, kExtent.x); ++i)
+                                    values[of][linear_index(kExtent, i, j, k)] = kind == 2 ? 0.0f : 0.5f;
+                    }
+        }
+        const DensityGrid a = DensityGrid::from_dense(values[0], kExtent, {}),
+                          b = DensityGrid::from_dense(values[1], kExtent, {});
+        double found = 0, wanted = 0;
+        std::multiset<std::pair<float, float>> pairs, all;
+        a.visit_blocks(b, [&](std::span<const float> of_a, std::span<const float> of_b) {
+            ASSERT_EQ(of_a.size(), of_b.size());
+            for (std::size_t n = 0; n < of_a.size(); ++n) {
+                found += std::abs(double(of_a[n]) - double(of_b[n]));
+                if (of_a[n] > 0 || of_b[n] > 0) pairs.insert({of_a[n], of_b[n]});
+            }
+        });
+        for (std::size_t n = 0; n < values[0].size(); ++n) {
+            wanted += std::abs(double(values[0][n]) - double(values[1][n]));
+            if (values[0][n] > 0 || values[1][n] > 0) all.insert({values[0][n], values[1][n]});
+        }
+        EXPECT_EQ(pairs, all);
+        EXPECT_NEAR(found, wanted, 1e-9 * wanted);
+    }
+    EXPECT_THROW(
+        DensityGrid().visit_blocks(DensityGrid::from_dense(std::vector<float>(8), {2, 2, 2}, {}), {}), Error);
 }
 
 TEST(DensityGrid, KeepsDenseValues) {

@@ -40,6 +40,35 @@ double sum_of(const Volume& v) {
     return sum;
 }
 
+TEST(Volume, CoarserVoxelsAreMeans) {
+    constexpr int kSide = 60;
+    const std::size_t cells = std::size_t(kSide) * kSide * kSide;
+    for (const float value : {1.0f, 0.7f, 3e38f}) {  // whatever the factor, to the last bit
+        const DensityGrid grid =
+            DensityGrid::from_dense(std::vector<float>(cells, value), {kSide, kSide, kSide}, {});
+        for (const int factor : {2, 3, 5, 6, 10, 12, 30, 60}) {
+            const Volume v = lay_out(grid, VolumeLayout{.factor = factor});
+            EXPECT_EQ(v.values, std::vector<float>(v.voxels(), value)) << factor;
+        }
+    }
+    const DensityGrid grid = random_grid({kSide, kSide, kSide}, 5);
+    const std::vector<float> dense = grid.to_dense();
+    for (const int factor : {2, 3, 7, 30}) {
+        const Volume v = lay_out(grid, VolumeLayout{.factor = factor});
+        for (int k = 0; k < v.nz; ++k)
+            for (int j = 0; j < v.ny; ++j)
+                for (int i = 0; i < v.nx; ++i) {
+                    double sum = 0;
+                    for (int z = k * factor; z < std::min(kSide, (k + 1) * factor); ++z)
+                        for (int y = j * factor; y < std::min(kSide, (j + 1) * factor); ++y)
+                            for (int x = i * factor; x < std::min(kSide, (i + 1) * factor); ++x)
+                                sum += double(dense[linear_index({kSide, kSide, kSide}, x, y, z)]);
+                    ASSERT_FLOAT_EQ(v.values[linear_index({v.nx, v.ny, v.nz}, i, j, k)],
+                                    float(sum / (double(factor) * factor * factor)));
+                }
+    }
+}
+
 TEST(Volume, LayoutPermutesPadsAndWraps) {
     const Extent extent{11, 9, 6};
     const DensityGrid grid = random_grid(extent, 1);
@@ -401,6 +430,32 @@ TEST(Bricks, DamagedFilesAreRefused) {
         bytes[at + 1] = char(0x7f);
         refused(bytes);
     }
+}
+
+TEST(Bricks, EmptyLevelsOfManyVoxelsAreReadWhereTheyAreKnown) {
+    const TemporaryFolder folder;
+    write_bricks(folder / "v.bricks", {Volume{8, 8, 8, std::vector<float>(512)}},
+                 {256, VoxelType::r8, 1, {}});
+    std::ifstream stream(folder / "v.bricks", std::ios::binary);
+    std::string bytes((std::istreambuf_iterator<char>(stream)), {});
+    constexpr std::uint32_t kSide = 660;  // 27 bricks, 274 MiB
+    constexpr std::size_t kSizes = 32, kTable = 44, kEntry = 40;
+    const auto put = [&](std::size_t at, std::uint32_t number) {
+        std::memcpy(bytes.data() + at, &number, sizeof number);
+    };
+    for (std::size_t a = 0; a < 3; ++a) put(kSizes + 4 * a, kSide);
+    put(24, 27);
+    for (std::uint32_t n = 1; n < 27; ++n) {
+        bytes += bytes.substr(kTable, kEntry);
+        put(kTable + n * kEntry + 4, n % 3);
+        put(kTable + n * kEntry + 8, n / 3 % 3);
+        put(kTable + n * kEntry + 12, n / 9);
+    }
+    std::ofstream(folder / "many.bricks", std::ios::binary) << bytes;
+    EXPECT_THROW(read_bricks(folder / "many.bricks"), Error);
+    const EncodedVolume volume = read_bricks(folder / "many.bricks", std::uint64_t(kSide) * kSide * kSide);
+    ASSERT_EQ(volume.levels.size(), 1u);
+    EXPECT_EQ(volume.levels[0].bytes.size(), std::size_t(kSide) * kSide * kSide);
 }
 
 }  // namespace
