@@ -484,16 +484,18 @@ int run_editor(const EditorOptions& options) {
     keep_settings(editor);
     if (!failure.empty()) throw Error(ErrorCode::io, failure);
     script.require_read();
-    if (!editor.capture_to.empty() && !editor.capture_by_user)
-        throw Error(ErrorCode::check,
-                    editor.capture_to.string() + ": was not saved: the editor had ended before");
-    if (!options.screenshot.empty() && (screenshot_due || !editor.picture)) {
+    const bool is_screenshot_under_way =
+        !options.screenshot.empty() && editor.capture_to == options.screenshot;
+    if (!options.screenshot.empty() && (screenshot_due || is_screenshot_under_way || !editor.picture)) {
         if (!editor.document->problems().empty()) throw SceneErrors(editor.document->problems());
         const std::string failed = editor.live->status().failure;
         throw Error(ErrorCode::io, failed.empty() ? options.screenshot.string() +
-                                                        ": no picture was made: the window was closed before"
+                                                        ": no picture was made: the editor had ended before"
                                                   : failed);
     }
+    if (!editor.capture_to.empty() && !editor.capture_by_user)
+        throw Error(ErrorCode::check,
+                    editor.capture_to.string() + ": was not saved: the editor had ended before");
     const std::vector<std::string> messages = editor.window->validation_messages();
     for (const std::string& message : messages) fmt::print(stderr, "validation: {}\n", message);
     return messages.empty() ? status : int(ErrorCode::gpu);

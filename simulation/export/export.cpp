@@ -68,16 +68,25 @@ PlannedSequence planned(const ExportOptions& options, const ExportSequence& s) {
     plan.factor = s.layout.factor;
     plan.levels = s.levels;
     plan.frames = s.frames.size();
-    std::error_code error;
-    const std::uintmax_t source = std::filesystem::file_size(s.frames.front().file, error);
+    std::uintmax_t source = 0;  // of a frame
+    for (const SourceFrame& frame : s.frames) {
+        std::error_code error;
+        const std::uintmax_t bytes = std::filesystem::file_size(frame.file, error);
+        source += error ? 0 : bytes / s.frames.size();
+    }
     for (const ExportFormat format : all_formats(options)) {
-        if (format == ExportFormat::usd) continue;
-        if (!is_dense(format)) {
-            // Uncompressed NanoVDB has some five times the bytes of a compressed VDB file.
-            plan.estimated_bytes += error ? 0 : source * (format == ExportFormat::nvdb ? 5 : 2);
-            continue;
+        if (format == ExportFormat::vdb) {
+            plan.estimated_bytes += source * (options.velocity_name.empty() ? 1 : 2);
+        } else if (format == ExportFormat::nvdb) {
+            // Not compressed it has some five times the bytes of a compressed VDB file, and nodes that are there always.
+            constexpr std::uint64_t kNodes = 300'000;
+            plan.estimated_bytes += options.zip ? source : 5 * source + kNodes;
+        } else if (is_dense(format)) {
+            const bool is_packed =
+                format == ExportFormat::bricks || format == ExportFormat::slices ||
+                (format == ExportFormat::vti && options.zip);  // these are at most as large
+            (is_packed ? plan.estimated_bytes : plan.bytes_a_frame) += dense_bytes(options, s, format);
         }
-        plan.bytes_a_frame += dense_bytes(options, s, format);
     }
     return plan;
 }
@@ -87,6 +96,7 @@ ExportReport report_of(const ExportOptions& options, const std::vector<ExportSeq
     for (const ExportSequence& s : sequences) {
         report.sequences.push_back(planned(options, s));
         const PlannedSequence& plan = report.sequences.back();
+        report.known_bytes += plan.frames * plan.bytes_a_frame;
         report.needed_bytes += plan.frames * (plan.bytes_a_frame + plan.estimated_bytes);
     }
     return report;
@@ -123,9 +133,12 @@ void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
 
 // A sparse file may have any box, whose voxels many formats hold all.
 void require_box(const ExportOptions& options, const ExportSequence& s) {
-    require_memory(std::size_t(box_bytes(options, s)),
-                   fmt::format("{}: its box of {} x {} x {} voxels (less with a larger --voxel)",
-                               s.frames.front().file.string(), s.extent.x, s.extent.y, s.extent.z));
+    const std::array<int, 3> size = box_of(s.extent, s.placement, s.layout).size;
+    require_memory(
+        std::size_t(box_bytes(options, s)),
+        fmt::format("{}: a box of {} x {} x {} voxels (less with a larger --voxel; VDB and NanoVDB without "
+                    "--voxel, --size or --budget need none)",
+                    s.frames.front().file.string(), size[0], size[1], size[2]));
 }
 
 // The winds of files, each of which has its own. It is linear between moments, so that one which stays needs its first and
@@ -366,7 +379,7 @@ void write_texts(const ExportOptions& options, const std::optional<RunListing>& 
 ExportReport plan_export(const ExportOptions& options) {
     check_options(options);
     std::vector<std::string> notes;
-    ExportReport report = report_of(options, list_sequences(options, notes));
+    ExportReport report = report_of(options, list_sequences(options, run_of(options), notes));
     report.notes = std::move(notes);
     return report;
 }
@@ -374,11 +387,11 @@ ExportReport plan_export(const ExportOptions& options) {
 ExportReport run_export(const ExportOptions& options, const ExportProgress& progress) {
     check_options(options);
     std::vector<std::string> notes;
-    std::vector<ExportSequence> sequences = list_sequences(options, notes);
-    std::optional<RunListing> run;  // of which weather is told
-    if (!options.weather.empty()) run = read_run(options.source);
+    std::optional<RunListing> run = run_of(options);
+    std::vector<ExportSequence> sequences = list_sequences(options, run, notes);
+    if (options.weather.empty()) run.reset();  // it is for weather alone from here on
     ExportReport report = report_of(options, sequences);
-    require_space(options.folder, report.needed_bytes);
+    require_space(options.folder, report.known_bytes);
     for (const ExportSequence& s : sequences) require_box(options, s);
     GridReader reader(options);
     const std::vector<ListedFrame> of_weather =

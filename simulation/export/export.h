@@ -84,10 +84,12 @@ struct ExportReport {
     std::vector<std::string> notes;  // adaptations, a sentence each
     std::vector<ExportedFile> files;
     std::size_t written = 0, kept = 0;
-    std::uint64_t needed_bytes = 0;  // of all frames
+    std::uint64_t known_bytes = 0;   // of all frames, of what is known beforehand
+    std::uint64_t needed_bytes = 0;  // of all frames, with what is estimated
 };
 
-using ExportProgress = std::function<bool(std::size_t frame, std::size_t frames)>;  // false: stop
+// Steps are frames of volumes that are written and frames of weather that are read. False: stop.
+using ExportProgress = std::function<bool(std::size_t done, std::size_t steps)>;
 
 // Throws Error(usage) for an option that none of the formats takes: nothing that a user asks for is left out in silence.
 // `given`: what the user wrote; `options`: the same with what a preset added.

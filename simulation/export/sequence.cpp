@@ -391,33 +391,35 @@ void look_at_weather(const RunListing& run, std::vector<std::string>& notes) {
 
 }  // namespace
 
-std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::vector<std::string>& notes) {
-    std::vector<ExportSequence> sequences;
+std::optional<RunListing> run_of(const ExportOptions& options) {
     std::error_code error;
-    if (options.files.empty() && std::filesystem::is_directory(options.source, error)) {
-        if (!is_run_folder(options.source))
-            throw Error(ErrorCode::io,
-                        options.source.string() + ": is no folder of a run (it has no manifest.json)");
-        const RunListing run = read_run(options.source);
-        if (!run.complete)
-            notes.push_back(run.folder.string() +
+    if (!options.files.empty() || !std::filesystem::is_directory(options.source, error)) return std::nullopt;
+    if (!is_run_folder(options.source))
+        throw Error(ErrorCode::io,
+                    options.source.string() + ": is no folder of a run (it has no manifest.json)");
+    return read_run(options.source);
+}
+
+std::vector<ExportSequence> list_sequences(const ExportOptions& options, const std::optional<RunListing>& run,
+                                           std::vector<std::string>& notes) {
+    std::vector<ExportSequence> sequences;
+    if (run) {
+        if (!run->complete)
+            notes.push_back(run->folder.string() +
                             ": the run is not complete; its frames so far are exported");
-        if (!options.weather.empty()) look_at_weather(run, notes);
+        if (!options.weather.empty()) look_at_weather(*run, notes);
         // Weather alone is made of the layers, and needs no file of all together.
-        const bool has_volumes = !all_formats(options).empty() || run.scene.layers.empty();
+        const bool has_volumes = !all_formats(options).empty() || run->scene.layers.empty();
         std::vector<std::optional<std::string>> layers{options.layer};
         if (options.layer == "each" || !has_volumes) {
             layers.clear();
-            for (const LayerOptions& layer : run.scene.layers)
+            for (const LayerOptions& layer : run->scene.layers)
                 if (has_density(layer)) layers.emplace_back(layer.name);
-            if (layers.empty())
-                throw Error(ErrorCode::usage, options.layer == "each"
-                                                  ? "--layer each: the scene has no layers"
-                                                  : "the scene has no layers with a density");
+            if (layers.empty()) throw Error(ErrorCode::usage, "the scene has no layers with a density");
         } else if (options.layer == "all") {
             layers = {std::nullopt};
         }
-        for (const auto& layer : layers) sequences.push_back(sequence_of_run(options, run, layer));
+        for (const auto& layer : layers) sequences.push_back(sequence_of_run(options, *run, layer));
     } else {
         sequences.push_back(sequence_of_files(options));
         if (options.layer && options.layer != "all")

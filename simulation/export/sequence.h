@@ -61,8 +61,13 @@ struct ExportSequence {
     float scale = 1;
 };
 
-// Lists the sequences of a run or of files, with their layout. Reads the first frame of each. Throws as plan_export().
-std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::vector<std::string>& notes);
+// Reads the run that is exported; nullopt where the source is files. Throws as plan_export().
+std::optional<RunListing> run_of(const ExportOptions& options);
+
+// Lists the sequences of a run, as it was read, or of files, with their layout. Reads the first frame of each. Throws as
+// plan_export().
+std::vector<ExportSequence> list_sequences(const ExportOptions& options, const std::optional<RunListing>& run,
+                                           std::vector<std::string>& notes);
 
 // Formats whose files hold the dense box.
 bool is_dense(ExportFormat format);

@@ -116,6 +116,25 @@ class InterruptedExport(Case):
         (self.folder / "out/.nephos-export/mine").unlink()
         self.export("out", "--to", "raw")
 
+    def test_a_run_that_grows_is_that_of_one_moment(self):
+        """Its volumes and its weather have the same frames, whenever others come."""
+        run = ("run", self.folder / "placed.toml", "--no-render", "--checkpoint-every", "0", "--out")
+        environment = {"LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "rename KILL 1 1", "FAIL_PATH": "placed_0005"}
+        self.call(*run, "short", status=-signal.SIGKILL, env=environment)
+        counts = set()
+        for opened in range(1, 9):
+            shutil.rmtree(self.folder / "run")
+            shutil.copytree(self.folder / "short", self.folder / "run")
+            process = self.stopped(f"open STOP {opened} 1", "manifest.json", "export", "run", "--to", "raw", "--to", "metar", "-o", f"out{opened}")
+            self.call(*run, "run", "--resume")
+            process.send_signal(signal.SIGCONT)
+            error = process.communicate(timeout=60)[1]
+            self.assertEqual(process.returncode, 0, error)
+            volumes = len(list((self.folder / f"out{opened}").glob("*.raw")))
+            self.assertEqual(len((self.folder / f"out{opened}/placed.metar.txt").read_text().splitlines()), volumes)
+            counts.add(volumes)
+        self.assertEqual(len(counts), 2)  # before it was read, and afterwards
+
     def test_a_link_in_place_of_the_hidden_folder_is_not_followed(self):
         """Also where it is put there when an export has begun to go on."""
         (self.folder / "victim").mkdir()

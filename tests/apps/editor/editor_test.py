@@ -813,7 +813,7 @@ class Failures(Case):
         self.edit(script="wait 1\nclose-window\nwait 5\nexpect-end\n")
         self.edit(script="wait 1\nquit\nclick nothing\n")
         said = self.edit("--screenshot", "never.png", "--after", "60", script="wait-step 1\nwait-picture\nclose-window\nwait 9\n", status=3)
-        self.assertIn("never.png: no picture was made: the window was closed before", said)
+        self.assertIn("never.png: no picture was made: the editor had ended before", said)
         self.assertIn("script.txt:2: waited too long for the end", self.edit(script="wait 1\nexpect-end\n", status=1))
 
 
