@@ -130,15 +130,15 @@ CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& perio
     cloud.height = (high[2] - low[2]) / factor + 1;
     std::array<int, 3> first = low;
     for (std::size_t a = 0; a < 2; ++a) first[a] -= (cloud.side * factor - (high[a] - low[a] + 1)) / 2;
-    std::vector<float> sums(std::size_t(cloud.side) * std::size_t(cloud.side) * std::size_t(cloud.height));
+    std::vector<double> sums(std::size_t(cloud.side) * std::size_t(cloud.side) * std::size_t(cloud.height));
     for (const Member& member : members) {
         std::array<std::size_t, 3> at{};
         for (std::size_t a = 0; a < 3; ++a) at[a] = std::size_t((member.place[a] - first[a]) / factor);
         sums[(at[2] * std::size_t(cloud.side) + at[1]) * std::size_t(cloud.side) + at[0]] +=
-            volume.values[member.index];
+            double(volume.values[member.index]);
     }
-    const float to_code = 255 / (scale * float(factor) * float(factor) * float(factor));
-    for (const float sum : sums) cloud.codes.push_back(std::uint8_t(std::min(255.0f, sum * to_code) + 0.5f));
+    const double to_code = 255 / (double(scale) * factor * factor * factor);
+    for (const double sum : sums) cloud.codes.push_back(std::uint8_t(std::min(255.0, sum * to_code) + 0.5));
     return cloud;
 }
 
