@@ -107,12 +107,15 @@ std::uint64_t most_brick_bytes(const std::vector<std::array<int, 3>>& sizes, int
     return bytes;
 }
 
-std::uint64_t brick_work_bytes(const std::vector<std::array<int, 3>>& sizes, int edge) {
+std::uint64_t brick_work_bytes(const std::vector<std::array<int, 3>>& sizes, int edge, VoxelType type) {
     // A vector that grows takes its old room and, twice as large, the new one.
     constexpr std::uint64_t kGrowing = 3,
                             kOfBrick =
                                 kGrowing * (sizeof(Entry) + sizeof(std::vector<std::byte>) + kEntryBytes);
-    std::uint64_t bytes = kMostKept;
+    const int side = edge + 2 * kBorder;
+    std::uint64_t bytes = kMostKept +
+                          sizeof(float) * std::uint64_t(side) * std::uint64_t(side) * std::uint64_t(side) +
+                          encoded_bytes(side, side, side, type);
     for (const std::array<int, 3>& size : sizes) bytes += kOfBrick * brick_count(size, edge);
     return bytes;
 }

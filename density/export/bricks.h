@@ -47,6 +47,6 @@ EncodedVolume read_bricks(const std::filesystem::path& path, std::uint64_t known
 std::uint64_t most_brick_bytes(const std::vector<std::array<int, 3>>& sizes, int edge, VoxelType type);
 
 // Returns the most memory that write_bricks() takes beside the levels.
-std::uint64_t brick_work_bytes(const std::vector<std::array<int, 3>>& sizes, int edge);
+std::uint64_t brick_work_bytes(const std::vector<std::array<int, 3>>& sizes, int edge, VoxelType type);
 
 }  // namespace nephos

@@ -51,6 +51,7 @@ class Clouds {
             most = mass;
             std::swap(best, cloud);
         }
+        cloud = {};  // its memory: the other grows
         add_edge(best);
         return best;
     }
@@ -142,9 +143,11 @@ CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& perio
     return cloud;
 }
 
-std::uint64_t largest_cloud_bytes(std::uint64_t voxels, std::uint64_t positive) {
+std::uint64_t largest_cloud_bytes(std::uint64_t voxels, int factor, std::uint64_t positive) {
     // Marks; and members in vectors, which take their old room and, twice as large, the new one while they grow.
-    return voxels * sizeof(std::uint8_t) + 3 * sizeof(Member) * positive;
+    const std::uint64_t cloud =
+        voxels * sizeof(std::uint8_t) + 3 * sizeof(Member) * std::min(positive, voxels);
+    return std::max(layout_bytes(voxels, factor), voxels * sizeof(float) + cloud);
 }
 
 void write_cloud_picture(const std::filesystem::path& path, const CloudVoxels& cloud, double type) {

@@ -29,8 +29,9 @@ struct CloudVoxels {
 // coarser by means of whole voxels. Without any cloud the box is empty, 32 x 32 x 1. Pure.
 CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& periodic, float scale);
 
-// Returns the most memory that largest_cloud() takes beside a volume of so many voxels, of which `positive` are above 0.
-std::uint64_t largest_cloud_bytes(std::uint64_t voxels, std::uint64_t positive);
+// Returns the most memory that laying a volume of so many voxels out by a factor (volume.h), and largest_cloud() of it, take
+// where at most `positive` of them are above 0.
+std::uint64_t largest_cloud_bytes(std::uint64_t voxels, int factor, std::uint64_t positive);
 
 // Writes the picture; `type` 0..1. Throws Error(io) naming the file.
 void write_cloud_picture(const std::filesystem::path& path, const CloudVoxels& cloud, double type);

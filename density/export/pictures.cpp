@@ -71,12 +71,19 @@ std::vector<std::byte> unzipped(ByteReader& reader) {
         throw Error(ErrorCode::io, "its table of blocks is damaged");
     std::vector<std::uint64_t> sizes(count);
     for (std::uint64_t& size : sizes) size = reader.get<std::uint64_t>();
-    std::vector<std::byte> out;
+    const auto size_of = [&](std::size_t n) { return n + 1 == sizes.size() && last != 0 ? last : block; };
+    std::uint64_t left = reader.rest().size(), all = 0;
     for (std::size_t n = 0; n < sizes.size(); ++n) {
-        const std::uint64_t size = n + 1 == sizes.size() && last != 0 ? last : block;
-        if (sizes[n] > reader.rest().size()) throw Error(ErrorCode::io, "it ends inside of a block");
-        if (size > most_inflated(sizes[n]))
+        if (sizes[n] > left) throw Error(ErrorCode::io, "it ends inside of a block");
+        if (size_of(n) > most_inflated(sizes[n]))
             throw Error(ErrorCode::io, "a block states more bytes than it can hold");
+        left -= sizes[n];
+        all += size_of(n);
+    }
+    std::vector<std::byte> out;
+    out.reserve(std::size_t(all));
+    for (std::size_t n = 0; n < sizes.size(); ++n) {
+        const std::uint64_t size = size_of(n);
         const std::size_t at = out.size();
         out.resize(at + std::size_t(size));
         uLongf length = uLongf(size);

@@ -75,17 +75,17 @@ PlannedSequence planned(const ExportOptions& options, const ExportSequence& s) {
         source += error ? 0 : bytes / s.frames.size();
     }
     for (const ExportFormat format : all_formats(options)) {
-        if (format == ExportFormat::vdb) {
+        if (format == ExportFormat::flightgear) {
+            plan.estimated_bytes += source;
+        } else if (format == ExportFormat::vdb) {
             plan.estimated_bytes += source * (options.velocity_name.empty() ? 1 : 2);
         } else if (format == ExportFormat::nvdb) {
             // Not compressed it has some five times the bytes of a compressed VDB file, and nodes that are there always.
             constexpr std::uint64_t kNodes = 300'000;
             plan.estimated_bytes += options.zip ? source : 5 * source + kNodes;
         } else if (is_dense(format)) {
-            const bool is_packed =
-                format == ExportFormat::bricks || format == ExportFormat::slices ||
-                (format == ExportFormat::vti && options.zip);  // these are at most as large
-            (is_packed ? plan.estimated_bytes : plan.bytes_a_frame) += dense_bytes(options, s, format);
+            const bool is_known = !is_packed(options, format) && format != ExportFormat::bricks;
+            (is_known ? plan.bytes_a_frame : plan.estimated_bytes) += dense_bytes(options, s, format);
         }
     }
     return plan;
@@ -111,10 +111,13 @@ bool cuts_values(const ExportOptions& options) {
     });
 }
 
-// The disk that holds the folder, or will; of an export that goes on, what it has written already is not counted again.
+// The disk that holds the folder, or will, has to hold the files whose size is known; of an export that goes on, those of them
+// that it has written already are not counted again.
 void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
     std::error_code none;
     for (const std::string& name : names_in_folder(folder)) {
+        constexpr std::string_view kKnown[] = {".raw", ".dds", ".ktx2", ".vti"};
+        if (std::ranges::count(kKnown, std::filesystem::path(name).extension().string()) == 0) continue;
         const std::uintmax_t size = std::filesystem::is_regular_file(folder / name, none)
                                         ? std::filesystem::file_size(folder / name, none)
                                         : 0;
@@ -127,7 +130,7 @@ void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
     const auto space = std::filesystem::space(at, error);
     if (error || space.available >= bytes) return;
     throw Error(ErrorCode::io,
-                fmt::format("{}: the export takes {}, but only {} are free", folder.string(),
+                fmt::format("{}: the export takes at least {}, but only {} are free", folder.string(),
                             bytes_text(std::size_t(bytes)), bytes_text(std::size_t(space.available))));
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -164,10 +165,10 @@ void FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
     if (format == ExportFormat::flightgear) {
         VolumeLayout layout;
         layout.factor = s.layout.factor;
-        const std::uint64_t voxels = voxels_of(s);
-        require_memory(layout_bytes(voxels, s.layout.factor) +
-                           largest_cloud_bytes(voxels, loaded.density.active_voxels()),
-                       frame.file.string() + ": to find its largest cloud");
+        const std::scoped_lock lock(cloud_mutex_);  // so that what was asked for is there
+        require_memory(
+            std::size_t(largest_cloud_bytes(voxels_of(s), s.layout.factor, loaded.density.active_voxels())),
+            frame.file.string() + ": to find its largest cloud");
         return write_cloud_picture(path,
                                    largest_cloud(lay_out(loaded.density, layout), s.layout.periodic, s.scale),
                                    billows_of(s.genus));
@@ -209,33 +210,32 @@ void FrameExporter::write_dense(const std::filesystem::path& path, ExportFormat 
 }
 
 std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
-    std::uint64_t levels = 0, passing = 0;
-    std::map<VoxelType, std::uint64_t> codes;
+    std::uint64_t passing = 0;  // of one file, while it is made
+    std::set<VoxelType> types;
+    bool has_boxes = false;
     const std::uint64_t voxels = voxels_of(s);
+    // Levels are made once, for all formats, and so are their codes in a type.
+    const std::vector<std::array<int, 3>> sizes = level_sizes(s, ExportFormat::raw);
     for (const ExportFormat format : all_formats(options)) {
+        const VoxelType type = type_of(options, format);
         const bool is_grid = format == ExportFormat::vdb || format == ExportFormat::nvdb;
-        if (format == ExportFormat::flightgear)
-            passing =
-                std::max(passing, layout_bytes(voxels, s.layout.factor) + largest_cloud_bytes(voxels, 0));
-        if (is_grid && s.layout.factor > 1)
-            passing = std::max(passing, layout_bytes(voxels, s.layout.factor));
-        if (!is_dense(format)) continue;
-        const std::vector<std::array<int, 3>> sizes = level_sizes(s, format);
-        std::uint64_t floats = 0;
-        for (const auto& [x, y, z] : sizes)
-            floats += sizeof(float) * std::uint64_t(x) * std::uint64_t(y) * std::uint64_t(z);
-        levels = std::max(levels, floats);
-        if (format == ExportFormat::bricks) {  // keeps no codes of all voxels
-            passing = std::max(passing, brick_work_bytes(sizes, options.brick_edge));
-            continue;
-        }
-        std::uint64_t& most = codes[type_of(options, format)];
-        most = std::max(most, dense_bytes(options, s, format));
+        std::uint64_t of_file = 0;
+        if (format == ExportFormat::flightgear) of_file = largest_cloud_bytes(voxels, s.layout.factor, 0);
+        if (is_grid && s.layout.factor > 1) of_file = layout_bytes(voxels, s.layout.factor);
+        if (format == ExportFormat::bricks) of_file = brick_work_bytes(sizes, options.brick_edge, type);
+        if (is_packed(options, format)) of_file = dense_bytes(options, s, format);
+        passing = std::max(passing, of_file);
+        has_boxes = has_boxes || is_dense(format);
+        if (is_dense(format) && format != ExportFormat::bricks) types.insert(type);
     }
-    for (const auto& [type, bytes] : codes) levels += bytes;
+    if (!has_boxes) return passing;
+    std::uint64_t levels = 0;
+    for (const auto& [x, y, z] : sizes) {
+        levels += sizeof(float) * std::uint64_t(x) * std::uint64_t(y) * std::uint64_t(z);
+        for (const VoxelType type : types) levels += encoded_bytes(x, y, z, type);
+    }
     const std::uint64_t top = box_of(s.extent, s.placement, s.layout).voxels();
-    if (levels > 0) levels = std::max(levels, layout_bytes(top, s.layout.factor));
-    return levels + passing;
+    return std::max(levels + passing, layout_bytes(top, s.layout.factor));
 }
 
 // Each frame takes its grid, its voxels as floats, and its boxes.

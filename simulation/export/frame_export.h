@@ -9,6 +9,7 @@
 #include <functional>
 #include <future>
 #include <map>
+#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -53,6 +54,7 @@ class FrameExporter {
 
     const ExportOptions& options_;
     ExportList& list_;
+    mutable std::mutex cloud_mutex_;  // one largest cloud is looked for at a time
 };
 
 // Frames that are written at the same time, so that one is encoded while another is read and a third is flushed to the

@@ -285,6 +285,10 @@ bool is_dense(ExportFormat format) {
            format != ExportFormat::flightgear;
 }
 
+bool is_packed(const ExportOptions& options, ExportFormat format) {
+    return format == ExportFormat::slices || (format == ExportFormat::vti && options.zip);
+}
+
 std::vector<std::array<int, 3>> level_sizes(const ExportSequence& s, ExportFormat format) {
     const bool one = format == ExportFormat::vti || format == ExportFormat::slices;
     std::vector<std::array<int, 3>> sizes{box_of(s.extent, s.placement, s.layout).size};

@@ -99,14 +99,23 @@ std::uint64_t codes_bytes(const VolumeBox& box, VoxelType type, int levels) {
     return bytes;
 }
 
+std::uint64_t size_of_file(const std::filesystem::path& path) {
+    std::error_code error;
+    const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+    return error ? 0 : bytes;  // reading it tells
+}
+
 EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
                          const VolumeBox& box, int levels) {
     const auto& [nx, ny, nz] = box.size;
-    if (format == "bricks") {  // a small file may have many voxels
-        const std::uint64_t bytes = codes_bytes(box, type, levels);
-        require_room(path, bytes, box);
-        return read_bricks(path, bytes);
-    }
+    // The file is read at once, and then its codes are made of it. What is compressed may have far more voxels than bytes, and
+    // has them twice on the way; of the others a wrong box asks for no memory.
+    const std::uint64_t of_file = size_of_file(path), codes = codes_bytes(box, type, levels);
+    const bool may_be_packed = format == "vti" || format == "slices",
+               is_packed = may_be_packed && of_file < codes;
+    const bool is_smaller = format == "bricks" || may_be_packed;
+    require_room(path, of_file + (is_packed ? 2 * codes : is_smaller ? codes : of_file), box);
+    if (format == "bricks") return read_bricks(path, codes);
     if (format == "raw") return read_raw(path, type, nx, ny, nz, levels);
     if (format == "dds") return read_dds(path);
     if (format == "ktx2") return read_ktx2(path);
@@ -143,9 +152,8 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     VolumeLayout plain;
     plain.factor = s.layout.factor;
     const VolumeBox cells = box_of(source.extent(), source.placement(), plain);
-    const std::uint64_t laid_out = layout_bytes(cells.voxels(), s.layout.factor);
     if (file.format == "vdb" || file.format == "nvdb") {
-        if (s.layout.factor > 1) require_room(path, laid_out, cells);
+        if (s.layout.factor > 1) require_room(path, layout_bytes(cells.voxels(), s.layout.factor), cells);
         const DensityGrid expected = coarser(source, s.layout.factor);
         Placement at = expected.placement();
         if (file.format == "nvdb") {
@@ -169,7 +177,8 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         return true;
     }
     if (file.format == "flightgear") {
-        require_room(path, laid_out + largest_cloud_bytes(cells.voxels(), source.active_voxels()), cells);
+        require_room(path, largest_cloud_bytes(cells.voxels(), s.layout.factor, source.active_voxels()),
+                     cells);
         const CloudVoxels expected = largest_cloud(lay_out(source, plain), s.layout.periodic, s.scale),
                           found = read_cloud_picture(path);
         if (found.side != expected.side || found.height != expected.height)
