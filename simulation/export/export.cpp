@@ -111,6 +111,19 @@ bool cuts_values(const ExportOptions& options) {
     });
 }
 
+// Returns the half of a step of the coarsest codes, below which all is 0, as a part of the scale; 0 where there are none.
+double least_of_codes(const ExportOptions& options) {
+    double least = 0;
+    for (const ExportFormat format : all_formats(options)) {
+        const VoxelType type = type_of(options, format);
+        if (format == ExportFormat::flightgear ||
+            (is_dense(format) && (type == VoxelType::r8 || type == VoxelType::bc4)))
+            least = std::max(least, 0.5 / 255);
+        if (is_dense(format) && type == VoxelType::r16) least = std::max(least, 0.5 / 65535);
+    }
+    return least;
+}
+
 // The disk that holds the folder, or will, has to hold the files whose size is known; of an export that goes on, those of them
 // that it has written already are not counted again.
 void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
@@ -191,7 +204,8 @@ class GridReader {
             load_densities(files, reading_, [&](std::size_t index, LoadedDensity&& loaded) {
                 const auto read = std::make_shared<const LoadedDensity>(std::move(loaded));
                 const std::size_t bytes = read->density.memory_bytes();
-                if (keep && bytes_ + bytes < kMostKept) {
+                // Of short memory most is for what the frames take.
+                if (keep && bytes_ + bytes < kMostKept && bytes < available_memory().bytes / 4) {
                     bytes_ += bytes;
                     kept_.emplace(files[index], read);
                 }
@@ -438,6 +452,12 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
                             "(--range auto keeps them)",
                             s.frames[of.size()].file.string(), frame.figures.max, s.scale));
+        if (frame.figures.max > 0 && frame.figures.max < least_of_codes(options) * double(s.scale))
+            notes.push_back(
+                fmt::format("{}: its largest value {:g} is below the first step of r8, r16 or bc4, in which "
+                            "nothing of it is left "
+                            "(--range auto keeps it)",
+                            s.frames[of.size()].file.string(), frame.figures.max));
         of.push_back(frame.figures);
         ++done;
     };

@@ -73,9 +73,13 @@ void compare(const DensityGrid& expected, const DensityGrid& found, double allow
 // On the way to a code and back there are five roundings of floats.
 constexpr double kRoundings = 5 * 0x1p-24;
 
-// A half is exact to its eleven bits; values are at most `scale`.
-double allowed_error(VoxelType type, double scale) {
-    return (largest_error(type) * 1.0001 + kRoundings) * scale + 1e-7;
+// Of codes that go to `scale`; floats are exact to their bits, a half to its eleven or its smallest step, of values of which none
+// is above `max`.
+double allowed_error(VoxelType type, double scale, double max) {
+    const bool is_float = type == VoxelType::r16f || type == VoxelType::r32f;
+    const double smallest = type == VoxelType::r16f ? 0x1p-24 * scale : 0;
+    return (largest_error(type) * 1.0001 + kRoundings) * (is_float ? max : scale) + smallest +
+           double(std::numeric_limits<float>::min());
 }
 
 // Throws ReadFailure unless there is room for what a comparison takes.
@@ -125,9 +129,10 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
 
 // Half a step of the codes of a leaf, which go from its least to its greatest value. The box has zeros, too.
 double allowed_error(NanoQuantise quantise, const DensityGrid& source) {
-    if (quantise == NanoQuantise::none) return allowed_error(VoxelType::r32f, 1);
+    const double max = double(source.max_value());
+    if (quantise == NanoQuantise::none) return allowed_error(VoxelType::r32f, 1, max);
     const double half_step = 1.001 / (quantise == NanoQuantise::fp8 ? 255 : 65535) / 2;
-    return double(source.max_value()) * (half_step + kRoundings) + 1e-6;
+    return max * (half_step + kRoundings) + double(std::numeric_limits<float>::min());
 }
 
 // Returns whether a grid lies where it should, but for the rounding of the centre of its first voxel, which is what files hold.
@@ -171,8 +176,8 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         const auto type = list.types.find(file.format);
         if (!(found.extent() == expected.extent())) bad_file(path, "has another size than its source");
         compare(expected, found,
-                allowed_error(type == list.types.end() ? VoxelType::r32f : type->second,
-                              std::max(1.0f, source.max_value())),
+                allowed_error(type == list.types.end() ? VoxelType::r32f : type->second, 1,
+                              double(source.max_value())),
                 d);
         return true;
     }
@@ -213,7 +218,7 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
                 decode(level.bytes.data(), level.bytes.size(), level.nx, level.ny, level.nz, encoded.type,
                        s.scale)
                     .values,
-                allowed_error(encoded.type, most), d, most);
+                allowed_error(encoded.type, double(s.scale), double(source.max_value())), d, most);
     }
     return true;
 }

@@ -409,6 +409,31 @@ class Export(Case):
                 status, text = limited(least, "verify", folder)
             self.assertEqual(status, 0, text)
 
+    def test_small_values(self):
+        """What is lost of them is told, and floats of 16 bits are compared as exactly as they hold them."""
+        import pyopenvdb
+        values = (numpy.random.default_rng(2).random((20, 20, 20)) * 4e-4).astype("f4")
+        grid = pyopenvdb.FloatGrid()
+        grid.copyFromArray(values)
+        grid.name = "density"
+        pyopenvdb.write(str(self.folder / "thin.vdb"), [grid])
+        for arguments, is_told in ((["--to", "raw", "--type", "r8"], True), (["--to", "dds"], True), (["--to", "flightgear"], True),
+                                   (["--to", "raw", "--type", "r16"], False), (["--to", "raw", "--type", "r8", "--range", "auto"], False)):
+            shutil.rmtree(self.folder / "thin", ignore_errors=True)
+            said = self.call("export", "thin.vdb", *arguments, "-o", "thin").stderr
+            self.assertEqual("below the first step" in said, is_told, said)
+            self.call("verify", "thin")
+        for arguments in (["--to", "raw", "--type", "r16f"], ["--to", "vdb", "--type", "r16f"], ["--to", "nvdb", "--quantise", "fp16"]):
+            shutil.rmtree(self.folder / "thin")
+            self.call("export", "thin.vdb", *arguments, "-o", "thin")
+            self.call("verify", "thin")
+        shutil.rmtree(self.folder / "thin")
+        self.call("export", "thin.vdb", "--to", "raw", "--type", "r16f", "-o", "thin")
+        file, = (self.folder / "thin").glob("*.raw")
+        file.write_bytes(bytes(len(file.read_bytes())))
+        self.relisted(self.folder / "thin", file.name)
+        self.assertRegex(self.call("verify", "thin", status=1).stdout, "FAIL +raw")
+
     def test_values_above_one_are_verified(self):
         """In 16 bits, whose steps are hardly larger than what is rounded on the way to a code and back."""
         import pyopenvdb
