@@ -168,7 +168,9 @@ class PipeReader final : public SandboxReader {
     }
 
     void receive(void* data, std::size_t size) {
-        if (size > most_) throw std::runtime_error("the reading process sent more than is allowed");
+        if (size > most_)  // a bound of memory, of which the file may be innocent
+            throw std::runtime_error(std::string(kCannotRead) +
+                                     "its content takes more than is allowed of memory");
         most_ -= size;
         char* out = static_cast<char*>(data);
         while (size > 0) {
