@@ -75,7 +75,7 @@ Volume lay_out(const DensityGrid& density, const VolumeLayout& layout) {
     const std::size_t first = std::size_t(box.border) * (stride[0] + stride[1] + stride[2]);
     const Extent extent = density.extent();
     const int f = layout.factor;
-    // Of values of one cloud that are alike sums of floats would go astray, and end where the next value is below their last bit.
+    // Adds in doubles: sums of floats of equal values go astray, and stand still once the next value is below their last bit.
     std::vector<double> sums(f == 1 ? 0 : volume.voxels());
     for (const Block& block : blocks_of(density)) {
         if (f == 1) {

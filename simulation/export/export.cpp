@@ -204,7 +204,7 @@ class GridReader {
             load_densities(files, reading_, [&](std::size_t index, LoadedDensity&& loaded) {
                 const auto read = std::make_shared<const LoadedDensity>(std::move(loaded));
                 const std::size_t bytes = read->density.memory_bytes();
-                // Of short memory most is for what the frames take.
+                // Leaves most of a short memory to what the frames take.
                 if (keep && bytes_ + bytes < kMostKept && bytes < available_memory().bytes / 4) {
                     bytes_ += bytes;
                     kept_.emplace(files[index], read);

@@ -73,8 +73,8 @@ void compare(const DensityGrid& expected, const DensityGrid& found, double allow
 // On the way to a code and back there are five roundings of floats.
 constexpr double kRoundings = 5 * 0x1p-24;
 
-// Of codes that go to `scale`; floats are exact to their bits, a half to its eleven or its smallest step, of values of which none
-// is above `max`.
+// Returns the error of codes that go to `scale`. Floats are exact to their bits and halves to their eleven, or their smallest
+// step, of values of which none is above `max`.
 double allowed_error(VoxelType type, double scale, double max) {
     const bool is_float = type == VoxelType::r16f || type == VoxelType::r32f;
     const double smallest = type == VoxelType::r16f ? 0x1p-24 * scale : 0;
