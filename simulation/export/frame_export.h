@@ -99,8 +99,8 @@ class FramesAtWork {
     std::deque<std::future<ExportedFrame>> frames_;
 };
 
-// Returns the memory that a frame takes beside its grid: the voxels of its box and of their levels as floats, their codes, and
-// those of coarser grids, which are dense on their way.
+// Returns the memory that a frame takes beside its grid: the voxels of its box and of their levels as floats, their codes in
+// each type, and what the largest of its files takes while it is made. FlightGear's cloud is not known before it is read.
 std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& sequence);
 
 // Returns a frame more than there are threads to compute with, as one waits for the device most of the time; of large frames

@@ -334,14 +334,18 @@ class Export(Case):
         self.call("export", "large.vdb", "--to", "raw", "--type", "r16f", "--range", "auto", "-o", "large")
         self.call("verify", "large")
 
-    def test_boxes_beyond_the_memory(self):
-        """Two voxels far apart: what holds all between them is refused before it is made, and a grid of them needs none of it."""
+    def write_apart(self, side):
+        """apart.vdb: two voxels at opposite corners of a box."""
         import pyopenvdb
         grid = pyopenvdb.FloatGrid()
-        for place in ((0, 0, 0), (15999, 15999, 15999)):
+        for place in ((0, 0, 0), (side - 1, side - 1, side - 1)):
             grid.getAccessor().setValueOn(place, 0.5)
         grid.name = "density"
         pyopenvdb.write(str(self.folder / "apart.vdb"), [grid])
+
+    def test_boxes_beyond_the_memory(self):
+        """Two voxels far apart: what holds all between them is refused before it is made, and a grid of them needs none of it."""
+        self.write_apart(16000)
         for side, arguments in ((16000, ["--to", "flightgear"]), (8000, ["--to", "nvdb", "--voxel", "2"]), (8000, ["--to", "vdb", "--voxel", "2"])):
             self.refused(2, "export", "apart.vdb", *arguments, "-o", "apart", says=f"apart.vdb: a box of {side} x {side} x {side} voxels")
             self.assertFalse((self.folder / "apart").exists())
@@ -351,12 +355,7 @@ class Export(Case):
     @unittest.skipIf(SANITIZED, "a sanitizer takes most of the addresses")
     def test_boxes_need_what_is_asked_for(self):
         """Little less than that is refused before anything is written, that much is enough."""
-        import pyopenvdb
-        grid = pyopenvdb.FloatGrid()
-        for place in ((0, 0, 0), (399, 399, 399)):
-            grid.getAccessor().setValueOn(place, 0.5)
-        grid.name = "density"
-        pyopenvdb.write(str(self.folder / "apart.vdb"), [grid])
+        self.write_apart(400)
 
         def limited(mebibytes, *arguments):
             result = subprocess.run([NEPHOS, *arguments, "-j", "1"], cwd=self.folder, capture_output=True, text=True, env=self.environment,
