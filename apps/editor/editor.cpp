@@ -180,13 +180,10 @@ void shortcuts(Editor& editor) {
     if (pressed(key_code("F1"))) editor.show_shortcuts = !editor.show_shortcuts;
     if (pressed(key_code("F12"))) open_dialog(editor, FileDialog::screenshot);
     if (io.WantTextInput) return;
-    const LiveStatus status = editor.live->status();
     if (pressed(key_code("SPACE"))) editor.live->run(editor.running = !editor.running);
-    const bool goes = pressed(key_code("HOME")) || pressed(key_code(",")) || pressed(key_code("."));
-    if (goes) editor.live->run(editor.running = false);
-    if (pressed(key_code("HOME"))) editor.live->seek(0);
-    if (pressed(key_code(","))) editor.live->seek(status.step > 0 ? status.step - 1 : 0);
-    if (pressed(key_code("."))) editor.live->seek(status.step + 1);
+    if (pressed(key_code("HOME"))) go_to_step(editor, 0);
+    if (pressed(key_code(","))) step_back(editor);
+    if (pressed(key_code("."))) step_on(editor);
     if (pressed('F')) frame_scene(editor);
     if (pressed('C')) take_scene_camera(editor);
     if (pressed('G')) editor.show_gizmos = !editor.show_gizmos;

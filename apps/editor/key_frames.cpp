@@ -54,11 +54,6 @@ std::vector<KeyMark> marks_of(const Scene& scene, const Node& values) {
     return marks;
 }
 
-void go_to(Editor& editor, std::uint64_t step) {
-    editor.live->run(editor.running = false);
-    editor.live->seek(step);
-}
-
 }  // namespace
 
 void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last_step) {
@@ -90,7 +85,7 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
                                                                   ImVec2(x + half, middle + half)};
         if (!hovered || std::abs(mouse.x - x - 0.5f * half) > 1.5f * half) continue;
         ImGui::SetTooltip("checkpoint: step %llu", static_cast<unsigned long long>(step));
-        if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) go_to(editor, step);
+        if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) go_to_step(editor, step);
     }
     static TextPath held;  // one mouse
     const Scene* const scene = editor.document->current_scene();
@@ -157,7 +152,7 @@ void back_to_checkpoint(Editor& editor) {
             true);
         return;
     }
-    go_to(editor, *std::prev(next));
+    go_to_step(editor, *std::prev(next));
 }
 
 }  // namespace nephos

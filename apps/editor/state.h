@@ -333,6 +333,12 @@ Vec3 point_under(const Editor& editor, const ImVec2& mouse);
 // Looks at the cloud under the mouse from half as far. Returns false when there is none.
 bool go_to_cloud(Editor& editor, const ImVec2& mouse);
 
+// timeline.cpp: a step that is gone to, and stood at. Steps on and back count from the one that is gone to: keys in turn are
+// as many steps, however long one takes.
+void go_to_step(Editor& editor, std::uint64_t step);
+void step_on(Editor& editor);
+void step_back(Editor& editor);
+
 // key_frames.cpp: marks below the time line's slider, `from` on in the window; checkpoints that the user set.
 void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last_step);
 void keep_checkpoint(Editor& editor);     // at the step that is shown

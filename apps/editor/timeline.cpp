@@ -114,32 +114,25 @@ void plot(Editor& editor, const char* title, const char* unit, std::span<const C
     }
     text += "\nClick: go there";
     ImGui::SetTooltip("%s", text.c_str());
-    if (ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
-        editor.live->run(editor.running = false);
-        editor.live->seek(step);
-    }
+    if (ImGui::IsMouseDown(ImGuiMouseButton_Left)) go_to_step(editor, step);
 }
 
-void transport(Editor& editor, const LiveStatus& status) {
-    const auto pause = [&] { editor.live->run(editor.running = false); };
+// Returns the step that steps on and back count from.
+std::uint64_t step_to_go_from(const Editor& editor) {
+    const LiveStatus status = editor.live->status();
+    return status.running ? status.step : status.goal;
+}
+
+void transport(Editor& editor) {
     if (button(editor, editor.running ? "Pause" : "Run", "Run or pause (Space)")) {
         editor.live->run(editor.running = !editor.running);
     }
     ImGui::SameLine();
-    if (button(editor, "|<", "Back to the start (Home)")) {
-        pause();
-        editor.live->seek(0);
-    }
+    if (button(editor, "|<", "Back to the start (Home)")) go_to_step(editor, 0);
     ImGui::SameLine();
-    if (button(editor, "<", "A step back (,)")) {
-        pause();
-        editor.live->seek(status.step > 0 ? status.step - 1 : 0);
-    }
+    if (button(editor, "<", "A step back (,)")) step_back(editor);
     ImGui::SameLine();
-    if (button(editor, ">", "A step on (.)")) {
-        pause();
-        editor.live->seek(status.step + 1);
-    }
+    if (button(editor, ">", "A step on (.)")) step_on(editor);
     ImGui::SameLine();
     if (button(editor, "Mark", "A checkpoint at this step (M); B goes back to the last one")) keep_checkpoint(editor);
     ImGui::SameLine();
@@ -161,23 +154,33 @@ void transport(Editor& editor, const LiveStatus& status) {
 
 }  // namespace
 
+void go_to_step(Editor& editor, std::uint64_t step) {
+    editor.live->run(editor.running = false);
+    editor.live->seek(step);
+}
+
+void step_on(Editor& editor) { go_to_step(editor, step_to_go_from(editor) + 1); }
+
+void step_back(Editor& editor) {
+    const std::uint64_t from = step_to_go_from(editor);
+    go_to_step(editor, from > 0 ? from - 1 : 0);
+}
+
 void timeline_panel(Editor& editor) {
     const LiveStatus status = editor.live->status();
-    transport(editor, status);
+    transport(editor);
     const double step_s = editor.shown_scene ? editor.shown_scene->automaton.time_step_s : 10;
     editor.live->set_speed(editor.speed / step_s);
     std::uint64_t last = editor.shown_scene ? editor.shown_scene->steps : 1;
-    last = std::max<std::uint64_t>({last, status.step, std::uint64_t(editor.steps.size())});
+    last = std::max<std::uint64_t>({last, status.step, status.goal, std::uint64_t(editor.steps.size())});
     ImGui::SameLine();
     const float from = ImGui::GetCursorScreenPos().x, width = ImGui::GetContentRegionAvail().x;
     ImGui::SetNextItemWidth(-1);
     // The step of the picture while it runs: with each of them, not between two, the window is drawn anew.
     std::uint64_t step = editor.running && editor.picture ? editor.picture->step : status.goal;
     const std::uint64_t first = 0;
-    if (ImGui::SliderScalar("##step", ImGuiDataType_U64, &step, &first, &last, "step %llu")) {
-        editor.live->run(editor.running = false);
-        editor.live->seek(step);
-    }
+    if (ImGui::SliderScalar("##step", ImGuiDataType_U64, &step, &first, &last, "step %llu"))
+        go_to_step(editor, step);
     editor.controls.note("time line");
     tooltip_of_last(
         "Step that is shown; drag it. Steps that were seen come back from checkpoints in memory.");

@@ -303,6 +303,14 @@ class Window(Case):
         self.assertGreater(count("wire.png", lambda red, green, blue: blue > 120 and blue > red + 20), 300)
         self.assertGreater(count("field.png", is_red), count("plain.png", is_red) + 100)
 
+    def test_keys_in_turn_are_as_many_steps(self):
+        """Also where a step is long, and the next key comes before it is taken; and by the buttons."""
+        scene = self.folder / "long.toml"
+        scene.write_text("seed = 4\n[lattice]\ncells = [256, 256, 128]\n[time]\nsteps = 40\n", encoding="utf-8")
+        self.edit(scene, script="wait 0.5\nkey SPACE\nkey HOME\n" + 6 * "key .\n" + "wait-step 6\npicture shown-%.png\n"
+                  + 3 * "key ,\n" + "click >\n" + 2 * "click <\n" + "wait 0.5\nwait-picture\npicture shown-%.png\n")
+        self.assertEqual(sorted(path.name for path in self.folder.glob("shown-*.png")), ["shown-2.png", "shown-6.png"])
+
     def test_slider_shows_in_the_picture(self):
         """A sun below the horizon darkens the picture, and undo brings the day back."""
         self.edit(self.scene("cumulus-by-hand.toml"), "--validation", script="""

@@ -552,7 +552,7 @@ class Problems(Kept):
 
     PROBLEM = 'click field\nclick "new field.grids"\nwait 0.5\nexpect-control problems\n'
     MENDED = "click field.grids\nclick field.grids[0]\nkey DELETE\nwait 0.5\n"
-    AT_STEP_3 = "wait 0.5\nkey SPACE\nkey HOME\nwait-picture\n" + 3 * "key .\nwait-picture\n" + "wait 0.3\n"
+    AT_STEP_3 = "wait 0.5\nkey SPACE\nkey HOME\nkey .\nkey .\nkey .\nwait 0.5\n"
     HEAD = "seed = 4\n[lattice]\ncells = [16, 16, 12]\n[time]\nstep_s = 2\nsteps = 40\n"
     SUN = HEAD + ("[sun]\nelevation_deg = 40\nazimuth_deg = 200\ncolour = [0.1, 0.2, 0.3]\n"
                   "[[sun.path]] # first\ntime_s = 0\nelevation_deg = 40\nazimuth_deg = 200\n"
