@@ -195,6 +195,7 @@ void LiveScene::set_speed(double steps_per_second) {
 
 void LiveScene::seek(std::uint64_t step) {
     const std::scoped_lock lock(mutex_);
+    if (!status_.failure.empty() && !new_scene_) return;  // nothing goes there
     goal_ = std::min<std::uint64_t>(step, kMaxFrames - 2);
     stops_here_ = false;
     simulation_due_.notify_all();
@@ -238,7 +239,8 @@ LiveScene::FrameOfScene LiveScene::frame_of_scene() const {
 LiveStatus LiveScene::status() const {
     const std::scoped_lock lock(mutex_);
     LiveStatus status = status_;
-    status.goal = goal_;
+    // A pause gives up a goal that is far away, once the step under way has ended.
+    status.goal = stops_here_ ? std::min(goal_, status_.step + 1) : goal_;
     status.rows = rows_.size();
     status.scenes = scenes_;
     if (status.failure.empty()) status.failure = draw_failure_;

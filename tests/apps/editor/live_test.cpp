@@ -134,6 +134,18 @@ TEST(LiveScene, RunsAtItsSpeedAndStops) {
     EXPECT_EQ(live.picture(0)->width, 96);
 }
 
+// Whoever pauses on a long way stands where it is paused, and steps are counted from there at once.
+TEST(LiveScene, APauseGivesUpAGoal) {
+    LiveScene live({.splatting = Splatting::cpu});
+    live.set_view(small_view());
+    live.start(small_scene(), 100000);
+    ASSERT_TRUE(comes([&] { return live.status().step > 3; }));
+    EXPECT_EQ(live.status().goal, 100000u);
+    live.run(false);
+    const LiveStatus paused = live.status();
+    EXPECT_LE(paused.goal, paused.step + 1);
+}
+
 // A simulation that is not shown goes on, without pictures; shown again it has that of its step.
 TEST(LiveScene, RunsUnseen) {
     LiveScene live({.splatting = Splatting::cpu});
@@ -161,6 +173,8 @@ TEST(LiveScene, FailuresAreSaidAndAnotherSceneGoesOn) {
     live.start(huge, 5);
     ASSERT_TRUE(comes([&] { return !live.status().failure.empty(); }));
     EXPECT_NE(live.status().failure.find("memory"), std::string::npos) << live.status().failure;
+    live.seek(9);  // nothing goes there
+    EXPECT_EQ(live.status().goal, live.status().step);
     live.start(small_scene(), 5);
     ASSERT_TRUE(comes([&] { return live.status().step == 5; }));
     EXPECT_EQ(live.status().failure, "");
