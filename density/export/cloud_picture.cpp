@@ -16,6 +16,7 @@ namespace nephos {
 namespace {
 
 constexpr int kSides[] = {32, 64, 128};
+constexpr int kMostHigh = 2048;       // layers of a texture that every OpenGL 4 has (GL_MAX_3D_TEXTURE_SIZE)
 constexpr std::size_t kChannels = 4;  // red, green, blue, alpha
 constexpr float kDense = 0.3f;        // of the largest density: what hangs together is one cloud
 constexpr int kEdge = 3;              // voxels of thin cloud around it
@@ -51,7 +52,7 @@ class Clouds {
             most = mass;
             std::swap(best, cloud);
         }
-        cloud = {};  // its memory: the other grows
+        std::vector<Member>().swap(cloud);  // its memory, too: the other grows
         add_edge(best);
         return best;
     }
@@ -125,10 +126,11 @@ CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& perio
             high[a] = std::max(high[a], member.place[a]);
         }
     const int widest = std::max(high[0] - low[0], high[1] - low[1]) + 1;
-    const int most = *std::rbegin(kSides), factor = (widest + most - 1) / most;
+    const int most = *std::rbegin(kSides), tall = high[2] - low[2] + 1;
+    const int factor = std::max((widest + most - 1) / most, (tall + kMostHigh - 1) / kMostHigh);
     CloudVoxels cloud;
     cloud.side = *std::ranges::lower_bound(kSides, (widest + factor - 1) / factor);
-    cloud.height = (high[2] - low[2]) / factor + 1;
+    cloud.height = (tall + factor - 1) / factor;
     std::array<int, 3> first = low;
     for (std::size_t a = 0; a < 2; ++a) first[a] -= (cloud.side * factor - (high[a] - low[a] + 1)) / 2;
     std::vector<double> sums(std::size_t(cloud.side) * std::size_t(cloud.side) * std::size_t(cloud.height));
@@ -139,15 +141,24 @@ CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& perio
             double(volume.values[member.index]);
     }
     const double to_code = 255 / (double(scale) * factor * factor * factor);
+    cloud.codes.reserve(sums.size());
     for (const double sum : sums) cloud.codes.push_back(std::uint8_t(std::min(255.0, sum * to_code) + 0.5));
     return cloud;
 }
 
-std::uint64_t largest_cloud_bytes(std::uint64_t voxels, int factor, std::uint64_t positive) {
+std::uint64_t largest_cloud_bytes(const std::array<int, 3>& size, const std::array<bool, 3>& periodic,
+                                  int factor, std::uint64_t positive) {
+    const std::uint64_t voxels = std::uint64_t(size[0]) * std::uint64_t(size[1]) * std::uint64_t(size[2]);
     // Marks; and members in vectors, which take their old room and, twice as large, the new one while they grow.
     const std::uint64_t cloud =
         voxels * sizeof(std::uint8_t) + 3 * sizeof(Member) * std::min(positive, voxels);
-    return std::max(layout_bytes(voxels, factor), voxels * sizeof(float) + cloud);
+    // Sums and codes of the cloud's own box. Across periodic sides it may be larger than its sky.
+    const int most = *std::rbegin(kSides), widest = std::min(most, std::max(size[0], size[1]));
+    const auto side =
+        std::uint64_t(periodic[0] || periodic[1] ? most : *std::ranges::lower_bound(kSides, widest));
+    const auto height = std::uint64_t(periodic[2] ? kMostHigh : std::min(size[2], kMostHigh));
+    const std::uint64_t box = side * side * height * (sizeof(double) + sizeof(std::uint8_t));
+    return std::max(layout_bytes(voxels, factor), voxels * sizeof(float) + cloud + box);
 }
 
 void write_cloud_picture(const std::filesystem::path& path, const CloudVoxels& cloud, double type) {

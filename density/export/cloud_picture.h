@@ -25,13 +25,15 @@ struct CloudVoxels {
 
 // Returns the cloud of the greatest mass. Clouds of a sky touch where they are thin, so a cloud is what hangs together where
 // it is dense: voxels of at least 0.3 of the largest density, each beside another of them, also across periodic sides;
-// with them up to three voxels of its thin edge, as far as density / scale rounds to 1/255 at least. It stands in the middle of a square of 32, 64 or 128 voxels; a wider one is made
-// coarser by means of whole voxels. Without any cloud the box is empty, 32 x 32 x 1. Pure.
+// with them up to three voxels of its thin edge, as far as density / scale rounds to 1/255 at least. It stands in the
+// middle of a square of 32, 64 or 128 voxels; a wider one, or one of more than 2,048 voxels up, is made coarser by means of
+// whole voxels. Without any cloud the box is empty, 32 x 32 x 1. Pure.
 CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& periodic, float scale);
 
-// Returns the most memory that laying a volume of so many voxels out by a factor (volume.h), and largest_cloud() of it, take
-// where at most `positive` of them are above 0.
-std::uint64_t largest_cloud_bytes(std::uint64_t voxels, int factor, std::uint64_t positive);
+// Returns the most memory that laying a volume of this size out by a factor (volume.h), and largest_cloud() of it, take where at
+// most `positive` of its voxels are above 0.
+std::uint64_t largest_cloud_bytes(const std::array<int, 3>& size, const std::array<bool, 3>& periodic,
+                                  int factor, std::uint64_t positive);
 
 // Writes the picture; `type` 0..1. Throws Error(io) naming the file.
 void write_cloud_picture(const std::filesystem::path& path, const CloudVoxels& cloud, double type);

@@ -150,4 +150,13 @@ int level_count(const std::array<int, 3>& size, int smallest) {
     return levels;
 }
 
+std::vector<std::array<int, 3>> level_sizes(const std::array<int, 3>& size, int levels) {
+    std::vector<std::array<int, 3>> sizes{size};
+    while (int(sizes.size()) < levels) {
+        sizes.push_back(sizes.back());
+        for (int& side : sizes.back()) side = std::max(1, side / 2);
+    }
+    return sizes;
+}
+
 }  // namespace nephos

@@ -87,6 +87,9 @@ Volume halved(const Volume& volume);
 // are padded so that all of them divide, and every level has the same mass.
 int level_count(const std::array<int, 3>& size, int smallest = 32);
 
+// Returns the sizes of so many levels, the first of which is that of the box.
+std::vector<std::array<int, 3>> level_sizes(const std::array<int, 3>& size, int levels);
+
 // Form of a voxel in a file.
 enum class VoxelType {
     r8,    // 8 bits, 0..1 as 0..255
@@ -100,6 +103,8 @@ std::string_view type_name(VoxelType type);
 
 // Returns the bytes of a box of this size: BC4 counts whole blocks.
 std::size_t encoded_bytes(int nx, int ny, int nz, VoxelType type);
+// Returns the sum of those of levels.
+std::uint64_t encoded_bytes(const std::vector<std::array<int, 3>>& sizes, VoxelType type);
 
 // Encodes value / scale; what is then outside of 0..1 is clamped in r8, r16 and bc4. Little-endian, x fastest.
 std::vector<std::byte> encode(const Volume& volume, VoxelType type, float scale);

@@ -99,6 +99,12 @@ std::size_t encoded_bytes(int nx, int ny, int nz, VoxelType type) {
     return std::size_t(nx) * std::size_t(ny) * std::size_t(nz) * bytes;
 }
 
+std::uint64_t encoded_bytes(const std::vector<std::array<int, 3>>& sizes, VoxelType type) {
+    std::uint64_t bytes = 0;
+    for (const std::array<int, 3>& size : sizes) bytes += encoded_bytes(size[0], size[1], size[2], type);
+    return bytes;
+}
+
 std::vector<std::byte> encode(const Volume& volume, VoxelType type, float scale) {
     std::vector<std::byte> out(encoded_bytes(volume.nx, volume.ny, volume.nz, type));
     const float inverse = 1 / scale;

@@ -2,160 +2,26 @@
 #include "simulation/export/export.h"
 
 #include <algorithm>
-#include <cmath>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <memory>
 #include <span>
-#include <system_error>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/paths.h"
-#include "core/text.h"
-#include "density/export/containers.h"
-#include "density/grid_names.h"
-#include "scenes/format/text.h"
 #include "simulation/export/export_list.h"
+#include "simulation/export/export_plan.h"
 #include "simulation/export/frame_export.h"
 #include "simulation/export/sequence.h"
 #include "simulation/export/weather.h"
 #include "simulation/folder_lock.h"
 #include "simulation/memory.h"
-#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {
-
-void check_options(const ExportOptions& o) {
-    if (o.formats.empty() && o.weather.empty())
-        throw Error(ErrorCode::usage, "neither --to nor --for says which files to write");
-    if (o.voxel_m && (o.largest_side || o.budget_bytes))
-        throw Error(ErrorCode::usage, "--voxel excludes --size and --budget");
-    if (o.largest_side && o.budget_bytes)
-        throw Error(ErrorCode::usage, "--size and --budget exclude each other");
-    if (!o.velocity_name.empty() && !is_name_of_wind(o.velocity_name))
-        throw Error(ErrorCode::usage, "--velocity: \"" + shortened(o.velocity_name) + "\": expected " +
-                                          std::string(kExpectedNameOfWind));
-    for (const ExportFormat format : all_formats(o)) {
-        const VoxelType type = type_of(o, format);
-        const bool whole = type == VoxelType::r8 || type == VoxelType::r16;
-        if (format == ExportFormat::vti && (type == VoxelType::bc4 || type == VoxelType::r16f))
-            throw Error(ErrorCode::usage,
-                        "--type " + std::string(type_name(type)) + ": VTK has r8, r16 and r32f");
-        if (format == ExportFormat::bricks && type == VoxelType::bc4)
-            throw Error(ErrorCode::usage, "--type bc4: bricks with a border have r8, r16, r16f or r32f");
-        if (format == ExportFormat::slices && !whole)
-            throw Error(ErrorCode::usage,
-                        "--type " + std::string(type_name(type)) + ": slices are r8 or r16");
-        if (format == ExportFormat::dds && o.legacy_dds && type != VoxelType::r8 && type != VoxelType::bc4)
-            throw Error(ErrorCode::usage, "--legacy-dds: the old header has r8 and bc4");
-        if (format == ExportFormat::vti && o.layout.axes != AxisOrder::enu)
-            throw Error(ErrorCode::usage,
-                        "--axes: VTK's space is right-handed and named x y z: leave it at enu for vti");
-    }
-}
-
-PlannedSequence planned(const ExportOptions& options, const ExportSequence& s) {
-    PlannedSequence plan;
-    plan.name = s.name;
-    plan.layer = s.layer;
-    plan.box = box_of(s.extent, s.placement, s.layout);
-    plan.factor = s.layout.factor;
-    plan.levels = s.levels;
-    plan.frames = s.frames.size();
-    std::uintmax_t source = 0;  // of a frame
-    for (const SourceFrame& frame : s.frames) {
-        std::error_code error;
-        const std::uintmax_t bytes = std::filesystem::file_size(frame.file, error);
-        source += error ? 0 : bytes / s.frames.size();
-    }
-    for (const ExportFormat format : all_formats(options)) {
-        if (format == ExportFormat::flightgear) {
-            plan.estimated_bytes += source;
-        } else if (format == ExportFormat::vdb) {
-            plan.estimated_bytes += source * (options.velocity_name.empty() ? 1 : 2);
-        } else if (format == ExportFormat::nvdb) {
-            // Not compressed it has some five times the bytes of a compressed VDB file, and nodes that are there always.
-            constexpr std::uint64_t kNodes = 300'000;
-            plan.estimated_bytes += options.zip ? source : 5 * source + kNodes;
-        } else if (is_dense(format)) {
-            const bool is_known = !is_packed(options, format) && format != ExportFormat::bricks;
-            (is_known ? plan.bytes_a_frame : plan.estimated_bytes) += dense_bytes(options, s, format);
-        }
-    }
-    return plan;
-}
-
-ExportReport report_of(const ExportOptions& options, const std::vector<ExportSequence>& sequences) {
-    ExportReport report;
-    for (const ExportSequence& s : sequences) {
-        report.sequences.push_back(planned(options, s));
-        const PlannedSequence& plan = report.sequences.back();
-        report.known_bytes += plan.frames * plan.bytes_a_frame;
-        report.needed_bytes += plan.frames * (plan.bytes_a_frame + plan.estimated_bytes);
-    }
-    return report;
-}
-
-// Returns whether values above the scale are cut in any of the files.
-bool cuts_values(const ExportOptions& options) {
-    return std::ranges::any_of(all_formats(options), [&](ExportFormat format) {
-        const VoxelType type = type_of(options, format);
-        const bool codes = type == VoxelType::r8 || type == VoxelType::r16 || type == VoxelType::bc4;
-        return format == ExportFormat::flightgear || (is_dense(format) && codes);
-    });
-}
-
-// Returns the half of a step of the coarsest codes, below which all is 0, as a part of the scale; 0 where there are none.
-double least_of_codes(const ExportOptions& options) {
-    double least = 0;
-    for (const ExportFormat format : all_formats(options)) {
-        const VoxelType type = type_of(options, format);
-        if (format == ExportFormat::flightgear ||
-            (is_dense(format) && (type == VoxelType::r8 || type == VoxelType::bc4)))
-            least = std::max(least, 0.5 / 255);
-        if (is_dense(format) && type == VoxelType::r16) least = std::max(least, 0.5 / 65535);
-    }
-    return least;
-}
-
-// The disk that holds the folder, or will, has to hold the files whose size is known; of an export that goes on, those of them
-// that it has written already are not counted again.
-void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
-    std::error_code none;
-    for (const std::string& name : names_in_folder(folder)) {
-        constexpr std::string_view kKnown[] = {".raw", ".dds", ".ktx2", ".vti"};
-        if (std::ranges::count(kKnown, std::filesystem::path(name).extension().string()) == 0) continue;
-        const std::uintmax_t size = std::filesystem::is_regular_file(folder / name, none)
-                                        ? std::filesystem::file_size(folder / name, none)
-                                        : 0;
-        if (size != std::uintmax_t(-1)) bytes -= std::min<std::uint64_t>(bytes, size);
-    }
-    std::filesystem::path at = std::filesystem::absolute(folder);
-    while (!std::filesystem::exists(at) && at.has_parent_path() && at != at.parent_path())
-        at = at.parent_path();
-    std::error_code error;
-    const auto space = std::filesystem::space(at, error);
-    if (error || space.available >= bytes) return;
-    throw Error(ErrorCode::io,
-                fmt::format("{}: the export takes at least {}, but only {} are free", folder.string(),
-                            bytes_text(std::size_t(bytes)), bytes_text(std::size_t(space.available))));
-}
-
-// A sparse file may have any box, whose voxels many formats hold all.
-void require_box(const ExportOptions& options, const ExportSequence& s) {
-    const std::array<int, 3> size = box_of(s.extent, s.placement, s.layout).size;
-    require_memory(
-        std::size_t(box_bytes(options, s)),
-        fmt::format("{}: a box of {} x {} x {} voxels (less with a larger --voxel; VDB and NanoVDB without "
-                    "--voxel, --size or --budget need none)",
-                    s.frames.front().file.string(), size[0], size[1], size[2]));
-}
 
 // The winds of files, each of which has its own. It is linear between moments, so that one which stays needs its first and
 // last alone, and one that never changes a single one.
@@ -204,8 +70,7 @@ class GridReader {
             load_densities(files, reading_, [&](std::size_t index, LoadedDensity&& loaded) {
                 const auto read = std::make_shared<const LoadedDensity>(std::move(loaded));
                 const std::size_t bytes = read->density.memory_bytes();
-                // Leaves most of a short memory to what the frames take.
-                if (keep && bytes_ + bytes < kMostKept && bytes < available_memory().bytes / 4) {
+                if (keep && bytes_ + bytes < most_kept()) {
                     bytes_ += bytes;
                     kept_.emplace(files[index], read);
                 }
@@ -218,48 +83,15 @@ class GridReader {
     }
 
   private:
-    static constexpr std::size_t kMostKept = std::size_t(256) << 20;
+    // Leaves nearly all of a short memory to what the frames take.
+    std::size_t most_kept() const {
+        return std::min(std::size_t(256) << 20, (available_memory().bytes + bytes_) / 16);
+    }
+
     VdbReadOptions reading_;
     std::map<std::filesystem::path, Read> kept_;
-    std::size_t bytes_ = 0;
+    std::size_t bytes_ = 0;  // of them
 };
-
-std::string sidecar_name(const ExportSequence& s) { return s.name + ".volume.json"; }
-std::string pvd_name(const ExportSequence& s) { return s.name + ".pvd"; }
-
-// Returns the name of the scene of all layers together.
-std::string usd_name(const std::vector<ExportSequence>& sequences) {
-    const std::string &name = sequences.front().name, &layer = sequences.front().layer;
-    return (layer.empty() ? name : name.substr(0, name.size() - layer.size() - 1)) + ".usda";
-}
-
-constexpr const char *kReadme = "README.txt", *kPackets = ".cigi";
-
-// Returns the names of all files. `run`: that of summaries of weather.
-std::vector<std::string> file_names(const ExportOptions& options, const std::optional<RunListing>& run,
-                                    const std::vector<ExportSequence>& sequences) {
-    std::vector<std::string> names{kReadme};
-    if (run) {
-        const std::string scene = run->scene.name;
-        for (const NamedWeather& named : weather_formats()) {
-            if (std::ranges::count(options.weather, named.format) == 0) continue;
-            names.push_back(scene + std::string(named.extension));
-            if (named.format == WeatherFormat::cigi) names.push_back(scene + kPackets);
-        }
-    }
-    for (const ExportFormat format : all_formats(options)) {
-        if (format == ExportFormat::usd) {
-            names.push_back(usd_name(sequences));
-            continue;
-        }
-        for (const ExportSequence& s : sequences) {
-            names.push_back(sidecar_name(s));
-            if (format == ExportFormat::vti) names.push_back(pvd_name(s));
-            for (const SourceFrame& frame : s.frames) names.push_back(frame_name(s, frame.number, format));
-        }
-    }
-    return names;
-}
 
 // Writes and lists a file that is made of no density.
 void write_text_file(ExportList& list, const std::string& name, std::span<const std::byte> content,
@@ -408,7 +240,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     std::vector<ExportSequence> sequences = list_sequences(options, run, notes);
     if (options.weather.empty()) run.reset();  // it is for weather alone from here on
     ExportReport report = report_of(options, sequences);
-    require_space(options.folder, report.known_bytes);
+    require_space(options, sequences);
     for (const ExportSequence& s : sequences) require_box(options, s);
     GridReader reader(options);
     const std::vector<ListedFrame> of_weather =
@@ -452,12 +284,16 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
                             "(--range auto keeps them)",
                             s.frames[of.size()].file.string(), frame.figures.max, s.scale));
-        if (frame.figures.max > 0 && frame.figures.max < least_of_codes(options) * double(s.scale))
+        if (const std::string lost = formats_that_lose(options, frame.figures.max, double(s.scale));
+            frame.figures.max > 0 && !lost.empty()) {
+            const char* const cure = options.type == VoxelType::r16f ? " (--type r32f keeps it)"
+                                     : options.range_auto            ? ""
+                                                                     : " (--range auto keeps it)";
             notes.push_back(
-                fmt::format("{}: its largest value {:g} is below the first step of r8, r16 or bc4, in which "
-                            "nothing of it is left "
-                            "(--range auto keeps it)",
-                            s.frames[of.size()].file.string(), frame.figures.max));
+                fmt::format("{}: its largest value {:g} is below the first step of {}, which has "
+                            "nothing of it{}",
+                            s.frames[of.size()].file.string(), frame.figures.max, lost, cure));
+        }
         of.push_back(frame.figures);
         ++done;
     };

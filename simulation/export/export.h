@@ -84,7 +84,6 @@ struct ExportReport {
     std::vector<std::string> notes;  // adaptations, a sentence each
     std::vector<ExportedFile> files;
     std::size_t written = 0, kept = 0;
-    std::uint64_t known_bytes = 0;   // of all frames, of what is known beforehand
     std::uint64_t needed_bytes = 0;  // of all frames, with what is estimated
 };
 

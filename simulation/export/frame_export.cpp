@@ -2,6 +2,7 @@
 #include "simulation/export/frame_export.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -30,9 +31,13 @@ std::string_view name_of(ExportFormat format) {
     return {};
 }
 
-// Voxels of the box, coarser if the options want that, without border and padding.
-std::uint64_t voxels_of(const ExportSequence& s) {
-    return box_of(s.extent, {}, VolumeLayout{.factor = s.layout.factor}).voxels();
+// The box of voxels, coarser if the options want that, without border and padding.
+VolumeBox cells_of(const ExportSequence& s) {
+    return box_of(s.extent, {}, VolumeLayout{.factor = s.layout.factor});
+}
+
+std::uint64_t cloud_bytes(const ExportSequence& s, std::uint64_t positive) {
+    return largest_cloud_bytes(cells_of(s).size, s.layout.periodic, s.layout.factor, positive);
 }
 
 void write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s,
@@ -118,6 +123,20 @@ void require_halves(const ExportOptions& options, const ExportSequence& s, const
     }
 }
 
+// Throws Error(usage) where values are so small that the library, which divides codes by the range of a leaf, finds infinity.
+void require_codes(const ExportOptions& options, const SourceFrame& frame, float largest) {
+    if (options.quantise == NanoQuantise::none || largest <= 0) return;
+    const float codes = options.quantise == NanoQuantise::fp8 ? 255 : 65535;
+    // A leaf of a smaller range than codes / max float is lost in half of a code of the largest value.
+    const float least = 2 * codes * codes / std::numeric_limits<float>::max();
+    if (largest >= least) return;
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("{}: its largest value is {:g}, and --quantise takes grids from {:g} on: expected "
+                    "--quantise none",
+                    frame.file.string(), largest, least));
+}
+
 }  // namespace
 
 ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& frame,
@@ -126,6 +145,7 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
         throw Error(ErrorCode::io,
                     frame.file.string() + ": has another box than the first file of its sequence");
     require_halves(options_, s, frame, loaded.density.max_value());
+    require_codes(options_, frame, loaded.density.max_value());
     const ExportSource source{frame.file, file_digest(frame.file)};
     require_unchanged(frame);
     Encodings made;
@@ -166,9 +186,8 @@ void FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
         VolumeLayout layout;
         layout.factor = s.layout.factor;
         const std::scoped_lock lock(cloud_mutex_);  // so that what was asked for is there
-        require_memory(
-            std::size_t(largest_cloud_bytes(voxels_of(s), s.layout.factor, loaded.density.active_voxels())),
-            frame.file.string() + ": to find its largest cloud");
+        require_memory(std::size_t(cloud_bytes(s, loaded.density.active_voxels())),
+                       frame.file.string() + ": to find its largest cloud");
         return write_cloud_picture(path,
                                    largest_cloud(lay_out(loaded.density, layout), s.layout.periodic, s.scale),
                                    billows_of(s.genus));
@@ -213,15 +232,14 @@ std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
     std::uint64_t passing = 0;  // of one file, while it is made
     std::set<VoxelType> types;
     bool has_boxes = false;
-    const std::uint64_t voxels = voxels_of(s);
     // Levels are made once, for all formats, and so are their codes in a type.
     const std::vector<std::array<int, 3>> sizes = level_sizes(s, ExportFormat::raw);
     for (const ExportFormat format : all_formats(options)) {
         const VoxelType type = type_of(options, format);
         const bool is_grid = format == ExportFormat::vdb || format == ExportFormat::nvdb;
         std::uint64_t of_file = 0;
-        if (format == ExportFormat::flightgear) of_file = largest_cloud_bytes(voxels, s.layout.factor, 0);
-        if (is_grid && s.layout.factor > 1) of_file = layout_bytes(voxels, s.layout.factor);
+        if (format == ExportFormat::flightgear) of_file = cloud_bytes(s, 0);
+        if (is_grid && s.layout.factor > 1) of_file = layout_bytes(cells_of(s).voxels(), s.layout.factor);
         if (format == ExportFormat::bricks) of_file = brick_work_bytes(sizes, options.brick_edge, type);
         if (is_packed(options, format)) of_file = dense_bytes(options, s, format);
         passing = std::max(passing, of_file);
@@ -229,11 +247,8 @@ std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
         if (is_dense(format) && format != ExportFormat::bricks) types.insert(type);
     }
     if (!has_boxes) return passing;
-    std::uint64_t levels = 0;
-    for (const auto& [x, y, z] : sizes) {
-        levels += sizeof(float) * std::uint64_t(x) * std::uint64_t(y) * std::uint64_t(z);
-        for (const VoxelType type : types) levels += encoded_bytes(x, y, z, type);
-    }
+    std::uint64_t levels = encoded_bytes(sizes, VoxelType::r32f);  // as floats
+    for (const VoxelType type : types) levels += encoded_bytes(sizes, type);
     const std::uint64_t top = box_of(s.extent, s.placement, s.layout).voxels();
     return std::max(levels + passing, layout_bytes(top, s.layout.factor));
 }

@@ -88,10 +88,12 @@ void read_first(const ExportOptions& options, ExportSequence& s) {
 ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& run,
                                const std::optional<std::string>& layer) {
     if (run.frames.empty())
-        throw Error(ErrorCode::usage,
-                    run.folder.string() +
-                        ": has no frames to export: it was run with --statistics-only, or ended "
-                        "before its first frame");
+        throw Error(
+            ErrorCode::usage,
+            run.folder.string() +
+                (run.complete ? ": has no frames to export: it was run with --statistics-only"
+                              : ": has no frames to export yet: it has not got so far, or was run with "
+                                "--statistics-only"));
     ExportSequence s;
     s.name = run.scene.name + (layer ? "_" + *layer : "");
     s.layer = layer.value_or("");
@@ -224,6 +226,17 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
         }
     };
     fit();
+    while (options.largest_side && dense) {
+        if (std::ranges::max(box_of(s.extent, s.placement, s.layout).size) <= *options.largest_side) break;
+        s.layout.factor = factor_near(s, s.layout.factor + 1, 1);
+        if (s.layout.factor == 0)
+            throw Error(
+                ErrorCode::usage,
+                fmt::format("--size {}: is less than border and padding leave of {}{}", *options.largest_side,
+                            s.name,
+                            keeps_period(s, longest) ? "" : ", of whose voxels whole tiles have to fit"));
+        fit();
+    }
     const auto frame_bytes = [&] {
         std::uint64_t bytes = 0;
         for (const ExportFormat format : formats)
@@ -291,21 +304,14 @@ bool is_packed(const ExportOptions& options, ExportFormat format) {
 
 std::vector<std::array<int, 3>> level_sizes(const ExportSequence& s, ExportFormat format) {
     const bool one = format == ExportFormat::vti || format == ExportFormat::slices;
-    std::vector<std::array<int, 3>> sizes{box_of(s.extent, s.placement, s.layout).size};
-    for (int n = 1; n < s.levels && !one; ++n) {
-        sizes.push_back(sizes.back());
-        for (int& side : sizes.back()) side = std::max(1, side / 2);
-    }
-    return sizes;
+    return level_sizes(box_of(s.extent, s.placement, s.layout).size, one ? 1 : s.levels);
 }
 
 std::uint64_t dense_bytes(const ExportOptions& options, const ExportSequence& s, ExportFormat format) {
     const VoxelType type = type_of(options, format);
     const std::vector<std::array<int, 3>> sizes = level_sizes(s, format);
     if (format == ExportFormat::bricks) return most_brick_bytes(sizes, options.brick_edge, type);
-    std::uint64_t bytes = 0;
-    for (const std::array<int, 3>& size : sizes) bytes += encoded_bytes(size[0], size[1], size[2], type);
-    return bytes;
+    return encoded_bytes(sizes, type);
 }
 
 VoxelType format_type(ExportFormat format) {

@@ -73,11 +73,11 @@ void compare(const DensityGrid& expected, const DensityGrid& found, double allow
 // On the way to a code and back there are five roundings of floats.
 constexpr double kRoundings = 5 * 0x1p-24;
 
-// Returns the error of codes that go to `scale`. Floats are exact to their bits and halves to their eleven, or their smallest
-// step, of values of which none is above `max`.
+// Returns the error of codes that go to `scale`. Floats are exact to their bits and halves to their eleven, or half of their
+// smallest step, of values of which none is above `max`.
 double allowed_error(VoxelType type, double scale, double max) {
     const bool is_float = type == VoxelType::r16f || type == VoxelType::r32f;
-    const double smallest = type == VoxelType::r16f ? 0x1p-24 * scale : 0;
+    const double smallest = type == VoxelType::r16f ? 0x1.0001p-25 * scale : 0;
     return (largest_error(type) * 1.0001 + kRoundings) * (is_float ? max : scale) + smallest +
            double(std::numeric_limits<float>::min());
 }
@@ -93,16 +93,6 @@ void require_room(const std::filesystem::path& path, std::uint64_t bytes, const 
     }
 }
 
-std::uint64_t codes_bytes(const VolumeBox& box, VoxelType type, int levels) {
-    std::uint64_t bytes = 0;
-    std::array<int, 3> size = box.size;
-    for (int n = 0; n < levels; ++n) {
-        bytes += encoded_bytes(size[0], size[1], size[2], type);
-        for (int& side : size) side = std::max(1, side / 2);
-    }
-    return bytes;
-}
-
 std::uint64_t size_of_file(const std::filesystem::path& path) {
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(path, error);
@@ -114,7 +104,8 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
     const auto& [nx, ny, nz] = box.size;
     // The file is read at once, and then its codes are made of it. What is compressed may have far more voxels than bytes, and
     // has them twice on the way; of the others a wrong box asks for no memory.
-    const std::uint64_t of_file = size_of_file(path), codes = codes_bytes(box, type, levels);
+    const std::uint64_t of_file = size_of_file(path),
+                        codes = encoded_bytes(level_sizes(box.size, levels), type);
     const bool may_be_packed = format == "vti" || format == "slices",
                is_packed = may_be_packed && of_file < codes;
     const bool is_smaller = format == "bricks" || may_be_packed;
@@ -182,8 +173,9 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         return true;
     }
     if (file.format == "flightgear") {
-        require_room(path, largest_cloud_bytes(cells.voxels(), s.layout.factor, source.active_voxels()),
-                     cells);
+        require_room(
+            path, largest_cloud_bytes(cells.size, s.layout.periodic, s.layout.factor, source.active_voxels()),
+            cells);
         const CloudVoxels expected = largest_cloud(lay_out(source, plain), s.layout.periodic, s.scale),
                           found = read_cloud_picture(path);
         if (found.side != expected.side || found.height != expected.height)

@@ -352,22 +352,38 @@ class Export(Case):
         self.call("export", "apart.vdb", "--to", "vdb", "--to", "nvdb", "-o", "apart")
         self.call("verify", "apart")
 
+    SLACK = 16  # MiB that a program takes beside what it asks for
+
+    def limited(self, mebibytes, *arguments):
+        result = subprocess.run([NEPHOS, *arguments, "-j", "1"], cwd=self.folder, capture_output=True, text=True, env=self.environment,
+                                preexec_fn=lambda: limit_addresses(int(mebibytes) << 20))
+        return result.returncode, result.stdout + result.stderr
+
+    def asked(self, text):
+        """What was asked for beyond what there is, in MiB; none in another message."""
+        found = re.search(r" takes about ([0-9.]+) ([KMG])iB, but ([0-9.]+) ([KMG])iB \(", text)
+        units = {"K": 1 / 1024, "M": 1, "G": 1024}
+        return found and float(found[1]) * units[found[2]] - float(found[3]) * units[found[4]]
+
+    def enough(self, *command, status):
+        """Returns addresses that are enough, in MiB: of its libraries, and what it has asked for in turn with `status`."""
+        mebibytes, has_asked = 100, False
+        while mebibytes < 1500:
+            found, text = self.limited(mebibytes, *command)
+            if found == 0:
+                return mebibytes
+            if self.asked(text):
+                self.assertEqual(found, status, text)
+            else:
+                self.assertFalse(has_asked, text)
+            has_asked = has_asked or bool(self.asked(text))
+            mebibytes += self.asked(text) + self.SLACK if self.asked(text) else 10
+        return self.fail(text)
+
     @unittest.skipIf(SANITIZED, "a sanitizer takes most of the addresses")
     def test_boxes_need_what_is_asked_for(self):
         """Little less than that is refused before anything is written, that much is enough."""
         self.write_apart(400)
-
-        def limited(mebibytes, *arguments):
-            result = subprocess.run([NEPHOS, *arguments, "-j", "1"], cwd=self.folder, capture_output=True, text=True, env=self.environment,
-                                    preexec_fn=lambda: limit_addresses(int(mebibytes) << 20))
-            return result.returncode, result.stdout + result.stderr
-
-        def asked(text):
-            """What was asked for beyond what there is, in MiB; none in another message."""
-            found = re.search(r" takes about ([0-9.]+) ([KMG])iB, but ([0-9.]+) ([KMG])iB \(", text)
-            units = {"K": 1 / 1024, "M": 1, "G": 1024}
-            return found and float(found[1]) * units[found[2]] - float(found[3]) * units[found[4]]
-
         first = 100
 
         def least_of(*command):
@@ -375,13 +391,12 @@ class Export(Case):
             nonlocal first
             for mebibytes in range(first, 1000, 10):
                 first = mebibytes
-                status, text = limited(mebibytes, *command)
-                if asked(text):
+                status, text = self.limited(mebibytes, *command)
+                if self.asked(text):
                     return mebibytes, status, text
                 self.assertNotEqual(status, 0, f"{command} has {mebibytes} MiB\n{text}")
             self.fail(text)
 
-        slack = 16
         for n, (arguments, is_sparse) in enumerate(((["--to", "raw", "--type", "r8"], False), (["--to", "bricks", "--type", "r32f"], False),
                                                     (["--to", "bricks", "--bricks", "256"], False), (["--to", "raw", "--mips"], False),
                                                     (["--to", "vti", "--zip"], False), (["--to", "slices"], False), (["--to", "flightgear"], False),
@@ -389,14 +404,14 @@ class Export(Case):
             folder = f"box{n}"
             export = ("export", "apart.vdb", *arguments, "-o", folder)
             if is_sparse:
-                self.assertEqual(limited(190, *export)[0], 0)
-                self.assertEqual(limited(190, "verify", folder)[0], 0)
+                self.assertEqual(self.limited(190, *export)[0], 0)
+                self.assertEqual(self.limited(190, "verify", folder)[0], 0)
                 continue
             least, status, text = least_of(*export)
             self.assertEqual(status, 2, text)
             self.assertRegex(text, "apart.vdb: a box of [0-9]+ x [0-9]+ x [0-9]+ voxels")
             self.assertFalse((self.folder / folder).exists())
-            status, text = limited(least + asked(text) + slack, *export)
+            status, text = self.limited(least + self.asked(text) + self.SLACK, *export)
             self.assertEqual(status, 0, text)
             least, status, text = least_of("verify", folder)
             self.assertEqual(status, 3, text)
@@ -404,9 +419,41 @@ class Export(Case):
             for _ in range(3):  # for the codes, then for the voxels beside them
                 if status == 0:
                     break
-                least += asked(text) + slack
-                status, text = limited(least, "verify", folder)
+                least += self.asked(text) + self.SLACK
+                status, text = self.limited(least, "verify", folder)
             self.assertEqual(status, 0, text)
+
+    @unittest.skipIf(SANITIZED, "a sanitizer takes most of the addresses")
+    def test_a_cloud_needs_what_is_asked_for(self):
+        """Of two of a size, both of which are held while the larger one gets its edge."""
+        import pyopenvdb
+        values = numpy.zeros((1000, 840, 5), "f4")
+        values[..., :2], values[..., 2], values[..., 3:] = 0.9, 0.1, 0.95
+        grid = pyopenvdb.FloatGrid()
+        grid.copyFromArray(values)
+        grid.name = "density"
+        pyopenvdb.write(str(self.folder / "two.vdb"), [grid])
+        self.enough("export", "two.vdb", "--to", "flightgear", "-o", "two", status=2)
+        self.enough("verify", "two", status=3)
+
+    @unittest.skipIf(SANITIZED, "a sanitizer takes most of the addresses")
+    def test_a_range_of_many_frames_needs_little_more(self):
+        """They are looked at for their largest value, and no more of them kept for the export than a short memory has room for."""
+        import pyopenvdb
+        values = numpy.random.default_rng(1).integers(1, 4, (64, 64, 64)).astype("f4") / 8
+        grid = pyopenvdb.FloatGrid()
+        grid.copyFromArray(values)
+        grid.getAccessor().setValueOn((199, 199, 199), 0.5)
+        grid.name = "density"
+        pyopenvdb.write(str(self.folder / "c_0001.vdb"), [grid])
+        files = ["c_0001.vdb"]
+        for number in range(2, 121):
+            files.append(f"c_{number:04}.vdb")
+            os.link(self.folder / files[0], self.folder / files[-1])
+        export = ("export", *files, "--to", "raw", "--type", "r8")
+        least = self.enough(*export, "-o", "one", status=2)
+        status, text = self.limited(least + 2 * self.SLACK, *export, "--range", "auto", "-o", "auto")
+        self.assertEqual(status, 0, text)
 
     def test_small_values(self):
         """What is lost of them is told, and floats of 16 bits are compared as exactly as they hold them."""
@@ -424,8 +471,21 @@ class Export(Case):
             self.call("verify", "thin")
         for arguments in (["--to", "raw", "--type", "r16f"], ["--to", "vdb", "--type", "r16f"], ["--to", "nvdb", "--quantise", "fp16"]):
             shutil.rmtree(self.folder / "thin")
-            self.call("export", "thin.vdb", *arguments, "-o", "thin")
+            self.assertNotIn("below", self.call("export", "thin.vdb", *arguments, "-o", "thin").stderr)
             self.call("verify", "thin")
+        # The formats in which nothing is left are named; codes of NanoVDB end where floats do.
+        for largest, arguments, lost in ((1e-3, ["--to", "raw", "--type", "r16", "--to", "flightgear"], "flightgear"),
+                                         (2e-8, ["--to", "raw", "--type", "r16f", "--to", "vdb"], "raw, vdb"),
+                                         (4e-8, ["--to", "raw", "--type", "r16f", "--to", "vdb"], None)):
+            grid.copyFromArray(values * numpy.float32(largest / 4e-4))
+            pyopenvdb.write(str(self.folder / "thinner.vdb"), [grid])
+            shutil.rmtree(self.folder / "thin")
+            said = self.call("export", "thinner.vdb", *arguments, "-o", "thin").stderr
+            self.assertEqual(f"is below the first step of {lost}, which" in said, lost is not None, said)
+            self.call("verify", "thin")
+        grid.copyFromArray(values * numpy.float32(1e-33))
+        pyopenvdb.write(str(self.folder / "thinner.vdb"), [grid])
+        self.refused(2, "export", "thinner.vdb", "--to", "nvdb", "--quantise", "fp8", "-o", "codes", says="takes grids from 3.8")
         shutil.rmtree(self.folder / "thin")
         self.call("export", "thin.vdb", "--to", "raw", "--type", "r16f", "-o", "thin")
         file, = (self.folder / "thin").glob("*.raw")
@@ -664,6 +724,32 @@ class Export(Case):
             self.relisted(folder, name)
             self.assertIn(says, self.call("verify", "out", status=1).stdout)
             self.export_again()
+
+    def test_flightgear_gets_a_cloud_of_any_height(self):
+        """A texture has 2,048 layers at least, and libpng takes a million columns: a taller cloud is of coarser voxels."""
+        import pyopenvdb
+        from PIL import Image
+        Image.MAX_IMAGE_PIXELS = None
+        for tall, layers in ((2048, 2048), (2049, 1025), (10000, 2000)):
+            grid = pyopenvdb.FloatGrid()
+            grid.fill((0, 0, 0), (9, 9, tall - 1), 1.0)
+            grid.name = "density"
+            pyopenvdb.write(str(self.folder / "tall.vdb"), [grid])
+            self.call("export", "tall.vdb", "--to", "flightgear", "-o", f"tall{tall}")
+            with Image.open(next((self.folder / f"tall{tall}").glob("*.png"))) as picture:
+                self.assertEqual(picture.size, (32 * layers, 32))
+                blue = numpy.array(picture)[..., 2].astype(float)
+            factor = -(-tall // layers)
+            self.assertAlmostEqual(blue.sum() * factor**3, 255 * 100 * tall, delta=2.55 * 100 * tall)  # its mass
+            self.call("verify", f"tall{tall}")
+
+    def test_size_counts_border_and_padding(self):
+        plan = lambda *arguments: json.loads(self.call("export", "run", "--to", "raw", *arguments, "--plan", "--json").stdout)["sequences"][0]
+        for size, arguments, expected in ((32, [], 32), (32, ["--border", "zero"], 18), (34, ["--border", "zero"], 34), (16, ["--pad", "16"], 16),
+                                          (17, ["--pad", "16"], 16), (20, ["--pad", "pow2"], 16), (10, ["--to", "dds"], 8), (3, ["--border", "zero"], 3)):
+            self.assertEqual(max(plan("--size", size, *arguments)["size"]), expected, (size, arguments))
+        for size, arguments in ((2, ["--border", "zero"]), (15, ["--pad", "16"])):
+            self.refused(2, "export", "run", "--to", "raw", "--size", size, *arguments, "-o", "small", says=f"--size {size}: is less than border and padding leave")
 
     def export_again(self):
         shutil.rmtree(self.folder / "out")
