@@ -256,9 +256,10 @@ std::vector<LiveStep> LiveScene::steps(std::uint64_t from) const {
 // With the mutex held: forgets a simulation that failed, so that only another scene starts one.
 void LiveScene::fail(const std::string& what) {
     is_advancing_ = stops_here_ = false;
+    forget_simulation();
+    if (new_scene_) return;  // another was started meanwhile: nobody looks at this one
     status_.failure = what;
     goal_ = status_.step;
-    forget_simulation();
     drawing_due_.notify_all();  // the last picture gets its detail
 }
 
@@ -342,6 +343,7 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     lock.lock();
     scene_ = scene;
     simulation_ = std::move(simulation);
+    status_.failure.clear();  // of the one before
     ++simulation_number_;
     if (keeps_state) {
         std::erase_if(checkpoints_, [this](const auto& entry) {

@@ -178,6 +178,15 @@ TEST(LiveScene, FailuresAreSaidAndAnotherSceneGoesOn) {
     live.start(small_scene(), 5);
     ASSERT_TRUE(comes([&] { return live.status().step == 5; }));
     EXPECT_EQ(live.status().failure, "");
+    // A change takes the place of one that has failed, too.
+    live.start(huge, 5);
+    ASSERT_TRUE(comes([&] { return !live.status().failure.empty(); }));
+    live.change(small_scene());
+    live.seek(7);
+    ASSERT_TRUE(comes([&] { return live.status().step == 7; }));
+    EXPECT_EQ(live.status().failure, "");
+    live.seek(2);
+    EXPECT_TRUE(comes([&] { return live.status().step == 2; }));
 }
 
 std::string layer_text(const std::string& name) {
