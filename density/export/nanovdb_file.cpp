@@ -9,6 +9,7 @@
 #include <new>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
 
 #include <ext/stdio_filebuf.h>
 #include <fcntl.h>
@@ -62,6 +63,13 @@ nanovdb::GridHandle<> converted(const FloatGrid& grid, NanoQuantise quantise) {
     return nanovdb::openToNanoVDB(grid);
 }
 
+// The library tells a lack of memory by words: of its buffer, and of a stream, which fails for nothing else where it is one of memory.
+bool is_of_memory(const std::exception& error) {
+    const std::string_view what = error.what();
+    return dynamic_cast<const std::bad_alloc*>(&error) != nullptr || what.ends_with("malloc failed") ||
+           what.starts_with("Failed to write");
+}
+
 }  // namespace
 
 void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
@@ -79,6 +87,7 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
     } catch (const Error&) {
         throw;
     } catch (const std::exception& error) {
+        if (is_of_memory(error)) throw std::bad_alloc();
         throw Error(ErrorCode::io, path.string() + ": cannot convert to NanoVDB: " + error.what());
     }
     write_atomically(path, std::string_view(stream.view()));
@@ -181,6 +190,7 @@ DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const
                                                          std::strerror(error.code().value())
                                                    : "it is no NanoVDB file, or is damaged: it ends early");
             } catch (const std::exception& error) {
+                if (is_of_memory(error)) throw std::bad_alloc();
                 throw std::runtime_error(std::string("it is no NanoVDB file, or is damaged: ") +
                                          error.what());
             }

@@ -284,16 +284,6 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
                             "(--range auto keeps them)",
                             s.frames[of.size()].file.string(), frame.figures.max, s.scale));
-        if (const std::string lost = formats_that_lose(options, frame.figures.max, double(s.scale));
-            frame.figures.max > 0 && !lost.empty()) {
-            const char* const cure = options.type == VoxelType::r16f ? " (--type r32f keeps it)"
-                                     : options.range_auto            ? ""
-                                                                     : " (--range auto keeps it)";
-            notes.push_back(
-                fmt::format("{}: its largest value {:g} is below the first step of {}, which has "
-                            "nothing of it{}",
-                            s.frames[of.size()].file.string(), frame.figures.max, lost, cure));
-        }
         of.push_back(frame.figures);
         ++done;
     };

@@ -164,7 +164,9 @@ ExportList::ExportList(const FolderLock& lock, const ExportOptions& options,
     json.erase("files");
     json.erase("complete");
     json.erase(kSealKey);
-    if (json.dump(2, ' ', false, Json::error_handler_t::replace) != head_)
+    // One that has made nothing, as for a refusal, leaves its folder to any other.
+    const bool is_empty = was_interrupted_ && files.empty() && noted_files(folder_).empty();
+    if (!is_empty && json.dump(2, ' ', false, Json::error_handler_t::replace) != head_)
         throw Error(ErrorCode::usage,
                     folder_.string() +
                         ": holds an export with other options, of another scene or other layers, or, under "

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <string_view>
 #include <system_error>
@@ -39,15 +40,19 @@ PlannedSequence planned(const ExportOptions& options, const ExportSequence& s) {
         const std::uintmax_t bytes = std::filesystem::file_size(frame.file, error);
         source += error ? 0 : bytes / s.frames.size();
     }
+    const double factor = s.layout.factor;
+    const auto grid = std::uint64_t(std::ceil(double(source) / (factor * factor * factor)));
     for (const ExportFormat format : all_formats(options)) {
         if (format == ExportFormat::flightgear) {
-            plan.estimated_bytes += source;
+            plan.estimated_bytes += grid;
         } else if (format == ExportFormat::vdb) {
-            plan.estimated_bytes += source * (options.velocity_name.empty() ? 1 : 2);
+            const bool has_wind =
+                !options.velocity_name.empty() && (!s.metadata.wind.empty() || !s.wind_fields.empty());
+            plan.estimated_bytes += grid * (has_wind ? 2 : 1);
         } else if (format == ExportFormat::nvdb) {
             // Not compressed it has some five times the bytes of a compressed VDB file, and nodes that are there always.
             constexpr std::uint64_t kNodes = 300'000;
-            plan.estimated_bytes += options.zip ? source : 5 * source + kNodes;
+            plan.estimated_bytes += options.zip ? grid : 5 * grid + kNodes;
         } else if (is_dense(format)) {
             (has_known_size(options, format) ? plan.bytes_a_frame : plan.estimated_bytes) +=
                 dense_bytes(options, s, format);
@@ -105,22 +110,6 @@ bool cuts_values(const ExportOptions& options) {
     });
 }
 
-std::string formats_that_lose(const ExportOptions& options, double value, double scale) {
-    std::string names;
-    for (const NamedFormat& named : export_formats()) {
-        if (std::ranges::count(all_formats(options), named.format) == 0) continue;
-        const VoxelType type = type_of(options, named.format);
-        double least = 0;  // half of the first step
-        if (type == VoxelType::r16f) least = 0x1p-25;
-        if (is_dense(named.format) && type == VoxelType::r16) least = 0.5 / 65535;
-        if (is_dense(named.format) && (type == VoxelType::r8 || type == VoxelType::bc4)) least = 0.5 / 255;
-        if (named.format == ExportFormat::flightgear) least = 0.5 / 255;
-        if (named.format != ExportFormat::vdb) least *= scale;
-        if (value < least) names += (names.empty() ? "" : ", ") + std::string(named.name);
-    }
-    return names;
-}
-
 void require_space(const ExportOptions& options, const std::vector<ExportSequence>& sequences) {
     std::uint64_t bytes = 0;
     for (const ExportSequence& s : sequences) {
@@ -149,7 +138,7 @@ void require_space(const ExportOptions& options, const std::vector<ExportSequenc
 void require_box(const ExportOptions& options, const ExportSequence& s) {
     const std::array<int, 3> size = box_of(s.extent, s.placement, s.layout).size;
     require_memory(
-        std::size_t(box_bytes(options, s)),
+        s.grid_bytes + std::size_t(box_bytes(options, s)),
         fmt::format("{}: a box of {} x {} x {} voxels (less with a larger --voxel; VDB and NanoVDB without "
                     "--voxel, --size or --budget need none)",
                     s.frames.front().file.string(), size[0], size[1], size[2]));

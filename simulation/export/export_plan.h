@@ -22,9 +22,6 @@ ExportReport report_of(const ExportOptions& options, const std::vector<ExportSeq
 // Returns whether values above the scale are cut in any of the files.
 bool cuts_values(const ExportOptions& options);
 
-// Returns the names of the formats in whose voxels a value becomes 0: below half of the first step of their codes or halves.
-std::string formats_that_lose(const ExportOptions& options, double value, double scale);
-
 // Throws Error(io) unless the disk that holds the folder, or will, has room for the files whose size is known; of an export that
 // goes on, those of them that it has written already are not counted again.
 void require_space(const ExportOptions& options, const std::vector<ExportSequence>& sequences);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <new>
 #include <optional>
 #include <set>
 #include <string>
@@ -40,8 +41,9 @@ std::uint64_t cloud_bytes(const ExportSequence& s, std::uint64_t positive) {
     return largest_cloud_bytes(cells_of(s).size, s.layout.periodic, s.layout.factor, positive);
 }
 
-void write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s,
-                    const LoadedDensity& loaded, double time_s) {
+// Writes the file; returns the largest of its values.
+float write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s,
+                     const LoadedDensity& loaded, double time_s) {
     const DensityGrid density = coarser(loaded.density, s.layout.factor);
     VdbContent content;
     VdbMetadata metadata = loaded.metadata.value_or(VdbMetadata{});
@@ -64,6 +66,7 @@ void write_vdb_file(const std::filesystem::path& path, const ExportOptions& opti
         content.wind_name = options.velocity_name;
     }
     write_vdb(path, content, metadata);
+    return density.max_value();
 }
 
 // Returns whether the VDB file of a frame would have the grid and metadata of its source: then its bytes are copied.
@@ -137,10 +140,29 @@ void require_codes(const ExportOptions& options, const SourceFrame& frame, float
                     frame.file.string(), largest, least));
 }
 
+// Returns whether values up to `largest`, as a part of the scale, are all 0 in a type: below half of its first step, which a
+// half has to exceed.
+bool is_lost(VoxelType type, double largest) {
+    if (type == VoxelType::r32f) return false;
+    if (type == VoxelType::r16f) return largest <= 0x1p-25;
+    return largest < 0.5 / (type == VoxelType::r16 ? 65535 : 255);
+}
+
 }  // namespace
 
 ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& frame,
                                    const LoadedDensity& loaded) const {
+    try {
+        return write_files(s, frame, loaded);
+    } catch (const std::bad_alloc&) {
+        throw Error(ErrorCode::io, frame.file.string() +
+                                       ": out of memory while it was exported: expected a larger --voxel, or "
+                                       "fewer frames at a time (-j 1)");
+    }
+}
+
+ExportedFrame FrameExporter::write_files(const ExportSequence& s, const SourceFrame& frame,
+                                         const LoadedDensity& loaded) const {
     if (!(loaded.density.extent() == s.extent) || !(loaded.density.placement() == s.placement))
         throw Error(ErrorCode::io,
                     frame.file.string() + ": has another box than the first file of its sequence");
@@ -168,6 +190,11 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
                                                  }),
                                 false});
     }
+    if (result.figures.max > 0 && !made.lost.empty())
+        result.notes.push_back(
+            fmt::format("{}: nothing of it is left in {}: its values, of which none is above {:g}, or their "
+                        "means are below the first step there",
+                        frame.file.string(), made.lost, result.figures.max));
     return result;
 }
 
@@ -175,28 +202,33 @@ void FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
                                  const ExportSequence& s, const SourceFrame& frame,
                                  const LoadedDensity& loaded, const ExportSource& source,
                                  Encodings& made) const {
+    const VoxelType type = type_of(options_, format);
+    const auto note_loss = [&](bool is_lost) {
+        if (is_lost) made.lost += (made.lost.empty() ? "" : ", ") + std::string(name_of(format));
+    };
     if (format == ExportFormat::vdb && is_copy(options_, s, frame, source)) {
         copy_atomically(frame.file, path);
         if (file_digest(path) == source.digest) return;
         throw Error(ErrorCode::io,
                     frame.file.string() + ": was changed while it was exported: export it again");
     }
-    if (format == ExportFormat::vdb) return write_vdb_file(path, options_, s, loaded, frame.time_s);
+    if (format == ExportFormat::vdb)
+        return note_loss(is_lost(type, double(write_vdb_file(path, options_, s, loaded, frame.time_s))));
     if (format == ExportFormat::flightgear) {
         VolumeLayout layout;
         layout.factor = s.layout.factor;
         const std::scoped_lock lock(cloud_mutex_);  // so that what was asked for is there
         require_memory(std::size_t(cloud_bytes(s, loaded.density.active_voxels())),
                        frame.file.string() + ": to find its largest cloud");
-        return write_cloud_picture(path,
-                                   largest_cloud(lay_out(loaded.density, layout), s.layout.periodic, s.scale),
-                                   billows_of(s.genus));
+        const CloudVoxels cloud = largest_cloud(lay_out(loaded.density, layout), s.layout.periodic, s.scale);
+        note_loss(std::ranges::all_of(cloud.codes, [](std::uint8_t code) { return code == 0; }));
+        return write_cloud_picture(path, cloud, billows_of(s.genus));
     }
     if (format == ExportFormat::nvdb)
         return write_nanovdb(path, coarser(loaded.density, s.layout.factor),
                              options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
     if (made.levels.empty()) made.levels = levels_of(loaded.density, s);
-    const VoxelType type = type_of(options_, format);
+    note_loss(is_lost(type, double(std::ranges::max(made.levels.front().values)) / double(s.scale)));
     if (format == ExportFormat::bricks)
         return write_bricks(path, made.levels, brick_options(options_, s, type));
     auto found = made.encoded.find(type);

@@ -36,7 +36,8 @@ class FrameExporter {
   public:
     FrameExporter(const ExportOptions& options, ExportList& list) : options_(options), list_(list) {}
 
-    // Throws Error(io) when the frame has another box than its sequence, or a file cannot be written.
+    // Throws Error(io) when the frame has another box than its sequence, or a file cannot be written, for lack
+    // of memory, too.
     ExportedFrame write(const ExportSequence& s, const SourceFrame& frame, const LoadedDensity& loaded) const;
 
   private:
@@ -44,8 +45,11 @@ class FrameExporter {
     struct Encodings {
         std::vector<Volume> levels;
         std::map<VoxelType, EncodedVolume> encoded;
+        std::string lost;  // names of formats in which nothing of the frame is left
     };
 
+    ExportedFrame write_files(const ExportSequence& s, const SourceFrame& frame,
+                              const LoadedDensity& loaded) const;
     void write_format(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,
                       const SourceFrame& frame, const LoadedDensity& loaded, const ExportSource& source,
                       Encodings& made) const;

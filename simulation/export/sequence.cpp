@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <set>
 
@@ -78,6 +79,7 @@ void read_first(const ExportOptions& options, ExportSequence& s) {
     reading.grid = options.grid;
     const LoadedDensity first = load_density(s.frames.front().file, reading);
     s.extent = first.density.extent();
+    s.grid_bytes = first.density.memory_bytes();
     s.placement = first.density.placement();
     s.refine = first.refine;
     s.of_nephos = first.metadata.has_value();
@@ -226,17 +228,29 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
         }
     };
     fit();
-    while (options.largest_side && dense) {
-        if (std::ranges::max(box_of(s.extent, s.placement, s.layout).size) <= *options.largest_side) break;
-        s.layout.factor = factor_near(s, s.layout.factor + 1, 1);
-        if (s.layout.factor == 0)
-            throw Error(
-                ErrorCode::usage,
-                fmt::format("--size {}: is less than border and padding leave of {}{}", *options.largest_side,
-                            s.name,
-                            keeps_period(s, longest) ? "" : ", of whose voxels whole tiles have to fit"));
-        fit();
-    }
+    // Takes larger and larger voxels until they do; returns whether any does.
+    const auto coarsen_until = [&](const auto& fits) {
+        while (!fits()) {
+            const int next = factor_near(s, s.layout.factor + 1, 1);
+            if (next == 0) return false;
+            s.layout.factor = next;
+            fit();
+        }
+        return true;
+    };
+    const auto longest_side = [&] { return std::ranges::max(box_of(s.extent, s.placement, s.layout).size); };
+    int least = std::numeric_limits<int>::max();
+    const auto has_size = [&] {
+        least = std::min(least, longest_side());
+        return least <= *options.largest_side;
+    };
+    if (options.largest_side && dense && !coarsen_until(has_size))
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("--size {}: the longest side of {} has at least {} voxels: {}{}those of a border "
+                        "and of --pad count",
+                        *options.largest_side, s.name, least, blocks ? "those of BC4 come in fours, " : "",
+                        keeps_period(s, longest) ? "" : "whole tiles have to fit, "));
     const auto frame_bytes = [&] {
         std::uint64_t bytes = 0;
         for (const ExportFormat format : formats)
@@ -247,13 +261,7 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
         if (!dense)
             throw Error(ErrorCode::usage,
                         "--budget counts dense formats: raw, bricks, vti, dds, ktx2 or slices");
-        while (frame_bytes() > *options.budget_bytes) {
-            const int next = factor_near(s, s.layout.factor + 1, 1);
-            if (next == 0) break;
-            s.layout.factor = next;
-            fit();
-        }
-        if (frame_bytes() > *options.budget_bytes)
+        if (!coarsen_until([&] { return frame_bytes() <= *options.budget_bytes; }))
             throw Error(ErrorCode::usage, "--budget " + bytes_text(std::size_t(*options.budget_bytes)) +
                                               " is less than the smallest frame takes" +
                                               (keeps_period(s, longest) ? "" : " whose tiles fit"));
@@ -262,17 +270,16 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
                 fmt::format("{}: voxels of {:g} m instead of {:g} m, so that a frame fits into {}", s.name,
                             edge * s.layout.factor, edge, bytes_text(std::size_t(*options.budget_bytes))));
     }
-    const VolumeBox box = box_of(s.extent, s.placement, s.layout);
-    const int side = std::max({box.size[0], box.size[1], box.size[2]});
+    const int side = longest_side();
     if (options.limit_side > 0 && dense && side > options.limit_side) {
-        const int factor =
-            factor_near(s, s.layout.factor * ((side + options.limit_side - 1) / options.limit_side), 1);
+        const bool is_cured = coarsen_until([&] { return longest_side() <= options.limit_side; });
         throw Error(ErrorCode::usage,
                     fmt::format("{}: {} voxels on a side, but {} takes at most {}: give {}", s.name, side,
                                 options.target, options.limit_side,
-                                factor > 0 ? fmt::format("--voxel {:g} or a --size", factor * edge)
-                                           : "a smaller lattice"));
+                                is_cured ? fmt::format("--voxel {:g} or a --size", s.layout.factor * edge)
+                                         : "a smaller lattice"));
     }
+    const VolumeBox box = box_of(s.extent, s.placement, s.layout);
     if (dense && box.padding != std::array<int, 3>{}) {
         bool repeats = false;
         for (std::size_t a = 0; a < 3; ++a)

@@ -46,6 +46,7 @@ struct ExportSequence {
     std::string layer;  // empty: all together
     std::vector<SourceFrame> frames;
     Extent extent;
+    std::size_t grid_bytes = 0;  // memory of the first frame's grid
     Placement placement;
     VdbMetadata metadata;  // of the first frame; defaults in a file of another program
     bool of_nephos = false;

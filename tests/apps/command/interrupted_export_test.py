@@ -294,7 +294,7 @@ class InterruptedExport(Case):
 
     def test_a_list_put_there_meanwhile_stays(self):
         """Where an export has looked for one, and not written its own yet."""
-        for stop, path in (("stat STOP 1 1", "out/placed_0001"), ("fsync STOP 1 1", "out/.export")):
+        for stop, path in (("stat STOP 2 1", "out/placed_0001"), ("fsync STOP 1 1", "out/.export")):
             process = self.stopped(stop, path, "export", "run", "--to", "raw", "-o", "out")
             (self.folder / "out/export.json").write_text("mine")
             process.send_signal(signal.SIGCONT)
