@@ -329,6 +329,7 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     const Scene scene = std::move(*new_scene_);
     const bool keeps_state = keeps_state_ && simulation_ != nullptr;
     new_scene_.reset();
+    status_.failure.clear();  // of the one before: what is gone to from here on is of this one
     lock.unlock();
     std::shared_ptr<Simulation> simulation;
     if (keeps_state) {
@@ -343,7 +344,6 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     lock.lock();
     scene_ = scene;
     simulation_ = std::move(simulation);
-    status_.failure.clear();  // of the one before
     ++simulation_number_;
     if (keeps_state) {
         std::erase_if(checkpoints_, [this](const auto& entry) {
