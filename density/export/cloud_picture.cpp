@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <deque>
 
 #include <png.h>
 
@@ -26,6 +27,7 @@ struct Member {
     std::size_t index;
     std::array<int, 3> place;
 };
+using Members = std::deque<Member>;  // grows without a copy of what it has
 
 class Clouds {
   public:
@@ -41,8 +43,8 @@ class Clouds {
     }
 
     // The voxels of the cloud of the greatest mass, of equal ones the first.
-    std::vector<Member> largest() {
-        std::vector<Member> best, cloud;
+    Members largest() {
+        Members best, cloud;
         double most = 0;
         for (std::size_t n = 0; (n = next_unseen(n)) < unseen_.size();) {
             gather_cloud(n, cloud);
@@ -52,7 +54,7 @@ class Clouds {
             most = mass;
             std::swap(best, cloud);
         }
-        std::vector<Member>().swap(cloud);  // its memory, too: the other grows
+        Members().swap(cloud);  // its memory, too: the other grows
         add_edge(best);
         return best;
     }
@@ -68,14 +70,14 @@ class Clouds {
         return found != nullptr ? std::size_t(static_cast<const std::uint8_t*>(found) - unseen_.data()) : unseen_.size();
     }
 
-    void gather_cloud(std::size_t first, std::vector<Member>& cloud) {
+    void gather_cloud(std::size_t first, Members& cloud) {
         const auto nx = std::size_t(size_[0]), ny = std::size_t(size_[1]);
         cloud.assign(1, {first, {int(first % nx), int(first / nx % ny), int(first / nx / ny)}});
         unseen_[first] = 0;
         for (std::size_t n = 0; n < cloud.size(); ++n) add_neighbours(n, cloud);
     }
 
-    void add_edge(std::vector<Member>& cloud) {
+    void add_edge(Members& cloud) {
         mark(least_);
         for (const Member& member : cloud) unseen_[member.index] = 0;
         for (std::size_t ring = 0, begin = 0; ring < std::size_t(kEdge); ++ring) {
@@ -86,7 +88,7 @@ class Clouds {
     }
 
     // Adds the marked voxels beside one of a cloud to it.
-    void add_neighbours(std::size_t n, std::vector<Member>& cloud) {
+    void add_neighbours(std::size_t n, Members& cloud) {
         const Member member = cloud[n];
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const int size = size_[axis];
@@ -117,7 +119,7 @@ class Clouds {
 }  // namespace
 
 CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& periodic, float scale) {
-    const std::vector<Member> members = Clouds(volume, periodic, scale).largest();
+    const Members members = Clouds(volume, periodic, scale).largest();
     if (members.empty()) return {kSides[0], 1, std::vector<std::uint8_t>(std::size_t(kSides[0]) * kSides[0])};
     std::array<int, 3> low = members.front().place, high = low;
     for (const Member& member : members)
@@ -149,9 +151,9 @@ CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& perio
 std::uint64_t largest_cloud_bytes(const std::array<int, 3>& size, const std::array<bool, 3>& periodic,
                                   int factor, std::uint64_t positive) {
     const std::uint64_t voxels = std::uint64_t(size[0]) * std::uint64_t(size[1]) * std::uint64_t(size[2]);
-    // Marks; and members in vectors, which take their old room and, twice as large, the new one while they grow.
-    const std::uint64_t cloud =
-        voxels * sizeof(std::uint8_t) + 3 * sizeof(Member) * std::min(positive, voxels);
+    // Marks; and members, of which a thirtieth is what the blocks of a deque take. All may be of one cloud.
+    const std::uint64_t members = sizeof(Member) * std::min(positive, voxels),
+                        cloud = voxels * sizeof(std::uint8_t) + members + members / 30;
     // Sums and codes of the cloud's own box. Across periodic sides it may be larger than its sky.
     const int most = *std::rbegin(kSides), widest = std::min(most, std::max(size[0], size[1]));
     const auto side =

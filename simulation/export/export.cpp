@@ -97,8 +97,10 @@ class GridReader {
 void write_text_file(ExportList& list, const std::string& name, std::span<const std::byte> content,
                      std::vector<std::string>& notes) {
     if (std::string note = list.note_on_change(name); !note.empty()) notes.push_back(std::move(note));
-    list.add_written(list.write_file(
-        name, {}, {}, [&](const std::filesystem::path& path) { write_atomically(path, content); }));
+    list.add_written(list.write_file(name, {}, {}, [&](const std::filesystem::path& path) {
+        write_atomically(path, content);
+        return false;  // nothing is lost
+    }));
 }
 
 // Throws Error(io) unless a folder still holds the run that was read of it, of which more frames may be there by now.

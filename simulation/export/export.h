@@ -66,6 +66,7 @@ struct ExportedFile {
     // What it was made of, for verify and for an export that goes on: empty for lists and texts.
     std::string source, format;
     std::optional<FileDigest> source_digest{};
+    bool is_lost = false;  // nothing of its source is left in it: all is below the first step of its type
 };
 
 // One sequence of an export: a layer, or all together.

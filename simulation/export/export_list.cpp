@@ -101,6 +101,7 @@ ExportedFile exported_file(const CheckedJson& json) {
     file.path = json.at("path").text();
     file.digest = {std::uint64_t(json.at("bytes").integer(0, kMostBytes)), json.at("xxh3").text()};
     if (!is_inside_folder(file.path)) json.at("path").fail("a file of its folder");
+    if (json.has("lost")) file.is_lost = json.at("lost").truth();
     if (!json.has("source")) return file;
     file.source = json.at("source").text();
     file.format = format_name_of(json.at("format"));
@@ -218,11 +219,12 @@ std::string ExportList::note_on_change(const std::string& name) const {
 
 ExportedFile ExportList::write_file(const std::string& name, const ExportSource& source,
                                     std::string_view format,
-                                    const std::function<void(const std::filesystem::path& path)>& write) {
+                                    const std::function<bool(const std::filesystem::path& path)>& write) {
     work_.require_in_place();
-    work_.write(name, write);
-    ExportedFile file{name, work_.digest_of(name), below_folder(source.path), std::string(format),
-                      source.digest};
+    bool is_lost = false;
+    work_.write(name, [&](const std::filesystem::path& path) { is_lost = write(path); });
+    ExportedFile file{
+        name, work_.digest_of(name), below_folder(source.path), std::string(format), source.digest, is_lost};
     work_.note(file);
     std::map<std::string, ExportedFile> made{{name, file}};  // before: what has its place must be listed
     if (earlier_.contains(name) && stands_there(folder_ / name))

@@ -45,11 +45,12 @@ class ExportList {
     std::optional<ExportedFile> kept_file(const std::string& name, const ExportSource& source) const;
     // Returns what is to be told of a file that is not as it was listed, and is about to be made again; empty: nothing. Thread-safe.
     std::string note_on_change(const std::string& name) const;
-    // Calls `write` with the path that it is to write, and returns the entry of the file, with its checksum. It is noted
+    // Calls `write` with the path that it is to write, which returns whether nothing of the source is left in the file, and returns
+    // the entry of the file, with its checksum. It is noted
     // before it gets its place (ExportWork), in which nothing may stand but a file that is listed. Thread-safe for different
     // files. Throws Error(usage) naming what stands there, Error(io); exceptions of `write` pass through.
     ExportedFile write_file(const std::string& name, const ExportSource& source, std::string_view format,
-                            const std::function<void(const std::filesystem::path& path)>& write);
+                            const std::function<bool(const std::filesystem::path& path)>& write);
     // List a file; those of frames in their order.
     void add_kept(ExportedFile file);
     void add_written(ExportedFile file);

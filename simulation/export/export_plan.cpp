@@ -46,9 +46,7 @@ PlannedSequence planned(const ExportOptions& options, const ExportSequence& s) {
         if (format == ExportFormat::flightgear) {
             plan.estimated_bytes += grid;
         } else if (format == ExportFormat::vdb) {
-            const bool has_wind =
-                !options.velocity_name.empty() && (!s.metadata.wind.empty() || !s.wind_fields.empty());
-            plan.estimated_bytes += grid * (has_wind ? 2 : 1);
+            plan.estimated_bytes += grid * (has_velocity(options, s) ? 2 : 1);
         } else if (format == ExportFormat::nvdb) {
             // Not compressed it has some five times the bytes of a compressed VDB file, and nodes that are there always.
             constexpr std::uint64_t kNodes = 300'000;
@@ -140,7 +138,7 @@ void require_box(const ExportOptions& options, const ExportSequence& s) {
     require_memory(
         s.grid_bytes + std::size_t(box_bytes(options, s)),
         fmt::format("{}: a box of {} x {} x {} voxels (less with a larger --voxel; VDB and NanoVDB without "
-                    "--voxel, --size or --budget need none)",
+                    "--voxel, --size, --budget and --velocity need none)",
                     s.frames.front().file.string(), size[0], size[1], size[2]));
 }
 

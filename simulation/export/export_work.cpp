@@ -62,6 +62,7 @@ Json export_entry(const ExportedFile& file) {
     if (file.source_digest)
         entry.update(
             Json{{"source_bytes", file.source_digest->bytes}, {"source_xxh3", file.source_digest->xxh3}});
+    if (file.is_lost) entry["lost"] = true;
     return entry;
 }
 

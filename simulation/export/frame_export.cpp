@@ -37,6 +37,14 @@ VolumeBox cells_of(const ExportSequence& s) {
     return box_of(s.extent, {}, VolumeLayout{.factor = s.layout.factor});
 }
 
+// Voxels of whole leaves of OpenVDB.
+std::uint64_t leaf_voxels(const std::array<int, 3>& size) {
+    constexpr int kLeafEdge = 8;
+    std::uint64_t voxels = 1;
+    for (const int side : size) voxels *= std::uint64_t(side + kLeafEdge - 1) / kLeafEdge * kLeafEdge;
+    return voxels;
+}
+
 std::uint64_t cloud_bytes(const ExportSequence& s, std::uint64_t positive) {
     return largest_cloud_bytes(cells_of(s).size, s.layout.periodic, s.layout.factor, positive);
 }
@@ -135,9 +143,10 @@ void require_codes(const ExportOptions& options, const SourceFrame& frame, float
     if (largest >= least) return;
     throw Error(
         ErrorCode::usage,
-        fmt::format("{}: its largest value is {:g}, and --quantise takes grids from {:g} on: expected "
-                    "--quantise none",
-                    frame.file.string(), largest, least));
+        fmt::format(
+            "{}: its largest value, or mean, is {:g}, and --quantise takes grids from {:g} on: expected "
+            "--quantise none",
+            frame.file.string(), largest, least));
 }
 
 // Returns whether values up to `largest`, as a part of the scale, are all 0 in a type: below half of its first step, which a
@@ -167,53 +176,53 @@ ExportedFrame FrameExporter::write_files(const ExportSequence& s, const SourceFr
         throw Error(ErrorCode::io,
                     frame.file.string() + ": has another box than the first file of its sequence");
     require_halves(options_, s, frame, loaded.density.max_value());
-    require_codes(options_, frame, loaded.density.max_value());
     const ExportSource source{frame.file, file_digest(frame.file)};
     require_unchanged(frame);
     Encodings made;
     ExportedFrame result{{loaded.density.sum(), double(loaded.density.max_value())}, {}, {}};
     if (std::string note = damage_note(frame, *source.digest); !note.empty())
         result.notes.push_back(std::move(note));
+    std::string lost;  // formats in which nothing of it is left
+    const auto add = [&](ExportedFile file, bool kept) {
+        if (file.is_lost) lost += (lost.empty() ? "" : ", ") + file.format;
+        result.files.push_back({std::move(file), kept});
+    };
     for (const ExportFormat format : all_formats(options_)) {
         if (format == ExportFormat::usd) continue;
         const std::string name = frame_name(s, frame.number, format);
         if (std::optional<ExportedFile> kept = list_.kept_file(name, source)) {
-            result.files.push_back({std::move(*kept), true});
+            add(std::move(*kept), true);
             continue;
         }
         if (std::string note = list_.note_on_change(name); !note.empty())
             result.notes.push_back(std::move(note));
-        result.files.push_back({list_.write_file(name, source, name_of(format),
-                                                 [&](const std::filesystem::path& path) {
-                                                     write_format(path, format, s, frame, loaded, source,
-                                                                  made);
-                                                 }),
-                                false});
+        const auto write = [&](const std::filesystem::path& path) {
+            const bool is_lost = write_format(path, format, s, frame, loaded, source, made);
+            return is_lost && result.figures.max > 0;
+        };
+        add(list_.write_file(name, source, name_of(format), write), false);
     }
-    if (result.figures.max > 0 && !made.lost.empty())
+    if (!lost.empty())
         result.notes.push_back(
             fmt::format("{}: nothing of it is left in {}: its values, of which none is above {:g}, or their "
                         "means are below the first step there",
-                        frame.file.string(), made.lost, result.figures.max));
+                        frame.file.string(), lost, result.figures.max));
     return result;
 }
 
-void FrameExporter::write_format(const std::filesystem::path& path, ExportFormat format,
+bool FrameExporter::write_format(const std::filesystem::path& path, ExportFormat format,
                                  const ExportSequence& s, const SourceFrame& frame,
                                  const LoadedDensity& loaded, const ExportSource& source,
                                  Encodings& made) const {
     const VoxelType type = type_of(options_, format);
-    const auto note_loss = [&](bool is_lost) {
-        if (is_lost) made.lost += (made.lost.empty() ? "" : ", ") + std::string(name_of(format));
-    };
     if (format == ExportFormat::vdb && is_copy(options_, s, frame, source)) {
         copy_atomically(frame.file, path);
-        if (file_digest(path) == source.digest) return;
+        if (file_digest(path) == source.digest) return false;
         throw Error(ErrorCode::io,
                     frame.file.string() + ": was changed while it was exported: export it again");
     }
     if (format == ExportFormat::vdb)
-        return note_loss(is_lost(type, double(write_vdb_file(path, options_, s, loaded, frame.time_s))));
+        return is_lost(type, double(write_vdb_file(path, options_, s, loaded, frame.time_s)));
     if (format == ExportFormat::flightgear) {
         VolumeLayout layout;
         layout.factor = s.layout.factor;
@@ -221,20 +230,26 @@ void FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
         require_memory(std::size_t(cloud_bytes(s, loaded.density.active_voxels())),
                        frame.file.string() + ": to find its largest cloud");
         const CloudVoxels cloud = largest_cloud(lay_out(loaded.density, layout), s.layout.periodic, s.scale);
-        note_loss(std::ranges::all_of(cloud.codes, [](std::uint8_t code) { return code == 0; }));
-        return write_cloud_picture(path, cloud, billows_of(s.genus));
+        write_cloud_picture(path, cloud, billows_of(s.genus));
+        return std::ranges::all_of(cloud.codes, [](std::uint8_t code) { return code == 0; });
     }
-    if (format == ExportFormat::nvdb)
-        return write_nanovdb(path, coarser(loaded.density, s.layout.factor),
-                             options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
+    if (format == ExportFormat::nvdb) {
+        const DensityGrid density = coarser(loaded.density, s.layout.factor);
+        require_codes(options_, frame, density.max_value());
+        write_nanovdb(path, density, options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
+        return false;
+    }
     if (made.levels.empty()) made.levels = levels_of(loaded.density, s);
-    note_loss(is_lost(type, double(std::ranges::max(made.levels.front().values)) / double(s.scale)));
-    if (format == ExportFormat::bricks)
-        return write_bricks(path, made.levels, brick_options(options_, s, type));
+    const bool lost = is_lost(type, double(std::ranges::max(made.levels.front().values)) / double(s.scale));
+    if (format == ExportFormat::bricks) {
+        write_bricks(path, made.levels, brick_options(options_, s, type));
+        return lost;
+    }
     auto found = made.encoded.find(type);
     if (found == made.encoded.end())
         found = made.encoded.emplace(type, encoded_levels(made.levels, type, s.scale)).first;
     write_dense(path, format, s, frame, found->second);
+    return lost;
 }
 
 void FrameExporter::write_dense(const std::filesystem::path& path, ExportFormat format,
@@ -273,6 +288,8 @@ std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
         if (format == ExportFormat::flightgear) of_file = cloud_bytes(s, 0);
         if (is_grid && s.layout.factor > 1) of_file = layout_bytes(cells_of(s).voxels(), s.layout.factor);
         if (format == ExportFormat::bricks) of_file = brick_work_bytes(sizes, options.brick_edge, type);
+        if (format == ExportFormat::vdb && has_velocity(options, s))
+            of_file += std::uint64_t(velocity_bytes(double(leaf_voxels(cells_of(s).size))));
         if (is_packed(options, format)) of_file = dense_bytes(options, s, format);
         passing = std::max(passing, of_file);
         has_boxes = has_boxes || is_dense(format);
@@ -289,16 +306,12 @@ std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
 std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& s) {
     const std::uint64_t memory =
         std::min<std::uint64_t>(std::uint64_t(256) << 20, available_memory().bytes / 2);
-    constexpr int kLeafEdge = 8;  // of OpenVDB
     const std::size_t threads =
         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     if (threads <= 1) return 1;
-    std::uint64_t voxels = 1;
-    for (const int side : {s.extent.x, s.extent.y, s.extent.z})
-        voxels *= std::uint64_t(side + kLeafEdge - 1) / kLeafEdge * kLeafEdge;
-    const auto wind = options.velocity_name.empty() ? 0 : std::uint64_t(velocity_bytes(double(voxels)));
+    const std::uint64_t voxels = leaf_voxels({s.extent.x, s.extent.y, s.extent.z});
     return std::size_t(
-        std::clamp<std::uint64_t>(memory / (8 * voxels + box_bytes(options, s) + wind), 1, threads + 1));
+        std::clamp<std::uint64_t>(memory / (8 * voxels + box_bytes(options, s)), 1, threads + 1));
 }
 
 }  // namespace nephos

@@ -45,12 +45,12 @@ class FrameExporter {
     struct Encodings {
         std::vector<Volume> levels;
         std::map<VoxelType, EncodedVolume> encoded;
-        std::string lost;  // names of formats in which nothing of the frame is left
     };
 
     ExportedFrame write_files(const ExportSequence& s, const SourceFrame& frame,
                               const LoadedDensity& loaded) const;
-    void write_format(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,
+    // Returns whether nothing of the frame is left in the file.
+    bool write_format(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,
                       const SourceFrame& frame, const LoadedDensity& loaded, const ExportSource& source,
                       Encodings& made) const;
     void write_dense(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,

@@ -167,7 +167,7 @@ int factor_near(const ExportSequence& s, int factor, int step) {
     const int below = factor_near(s, factor, -1), above = factor_near(s, factor, 1);
     std::string cure;
     for (const int f : {below, above})
-        if (f > 1) cure += (cure.empty() ? "--voxel " : " or --voxel ") + number_text(f * edge, 6);
+        if (f > 1) cure += (cure.empty() ? "--voxel " : " or --voxel ") + number_text(f * edge, 9);
     throw Error(
         ErrorCode::usage,
         fmt::format(
@@ -187,7 +187,7 @@ int factor_of(const ExportOptions& options, const ExportSequence& s) {
                 std::clamp(std::round(ratio), 1.0, double(std::ranges::max(sides_of(s)))) * edge;
             throw Error(ErrorCode::usage, fmt::format("--voxel {:g}: the grid's voxels are {:g} m, and only "
                                                       "means of whole numbers of them keep the mass: "
-                                                      "expected a multiple such as {:g}",
+                                                      "expected a multiple such as {:.9g}",
                                                       *options.voxel_m, edge, near));
         }
         const int factor = int(std::lround(ratio));
@@ -198,8 +198,12 @@ int factor_of(const ExportOptions& options, const ExportSequence& s) {
     const int longest = std::ranges::max(sides_of(s));
     const int least = std::max(1, (longest + *options.largest_side - 1) / *options.largest_side);
     const int factor = factor_near(s, least, 1);
-    if (factor == 0) refuse_period(s, fmt::format("--size {}", *options.largest_side), least);
-    return factor;
+    if (factor > 0) return factor;
+    const int coarsest = factor_near(s, longest, -1);
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("--size {}: the longest side of {} has at least {} voxels: whole tiles have to fit",
+                    *options.largest_side, s.name, (longest + coarsest - 1) / coarsest));
 }
 
 // Sizes, levels and padding of one sequence.
@@ -276,7 +280,7 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
         throw Error(ErrorCode::usage,
                     fmt::format("{}: {} voxels on a side, but {} takes at most {}: give {}", s.name, side,
                                 options.target, options.limit_side,
-                                is_cured ? fmt::format("--voxel {:g} or a --size", s.layout.factor * edge)
+                                is_cured ? fmt::format("--voxel {:.9g} or a --size", s.layout.factor * edge)
                                          : "a smaller lattice"));
     }
     const VolumeBox box = box_of(s.extent, s.placement, s.layout);
@@ -303,6 +307,10 @@ bool is_wanted(const ExportOptions& o, int number, int least) {
 bool is_dense(ExportFormat format) {
     return format != ExportFormat::nvdb && format != ExportFormat::usd && format != ExportFormat::vdb &&
            format != ExportFormat::flightgear;
+}
+
+bool has_velocity(const ExportOptions& options, const ExportSequence& s) {
+    return !options.velocity_name.empty() && (!s.metadata.wind.empty() || !s.wind_fields.empty());
 }
 
 bool is_packed(const ExportOptions& options, ExportFormat format) {

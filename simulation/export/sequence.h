@@ -74,6 +74,8 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, const s
 bool is_dense(ExportFormat format);
 // Those of them whose files are compressed: made in memory, and at most about as large as the box.
 bool is_packed(const ExportOptions& options, ExportFormat format);
+// Returns whether its VDB files have a grid of the wind.
+bool has_velocity(const ExportOptions& options, const ExportSequence& sequence);
 VoxelType type_of(const ExportOptions& options, ExportFormat format);
 // Sizes of the levels of a sequence in files of a format: of most all, of some the first alone.
 std::vector<std::array<int, 3>> level_sizes(const ExportSequence& sequence, ExportFormat format);

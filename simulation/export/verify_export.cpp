@@ -24,8 +24,9 @@ namespace {
 
 // Of the voxels of all files of a format to their sources.
 struct Difference {
-    double largest = 0, allowed = 0, squares = 0;
-    bool passed = true;               // no voxel differs by more than its type allows
+    double largest = 0, allowed = 0, squares = 0;  // the first two of any voxel
+    double too_far = 0,
+           instead_of = 0;  // of the voxel that differs most from what is allowed of it; 0: none by more
     std::size_t voxels = 0, cut = 0;  // cut: of the source above what their type holds
 };
 
@@ -33,54 +34,85 @@ struct Difference {
     throw Error(ErrorCode::io, path.string() + ": " + what);
 }
 
-// The differences of one file, none of which may be above `allowed`.
-void add(double largest, double allowed, std::size_t voxels, Difference& d) {
-    d.largest = std::max(d.largest, largest);
+// What a voxel may differ by: so much, and so much of its value.
+struct Tolerance {
+    double absolute = 0, relative = 0;
+};
+
+// Adds the difference of a voxel.
+void add(double expected, double found, double allowed, Difference& d) {
+    const double difference = std::abs(expected - found);
+    d.largest = std::max(d.largest, difference);
     d.allowed = std::max(d.allowed, allowed);
-    d.passed = d.passed && largest <= allowed;
-    d.voxels += voxels;
+    if (difference > allowed && (d.too_far == 0 || difference * d.instead_of > d.too_far * allowed)) {
+        d.too_far = difference;
+        d.instead_of = allowed;
+    }
+    d.squares += difference * difference;
 }
 
-// `most` is the greatest value that the type holds: greater ones of the source are it in the file.
+// `allowed` gives what the voxel of an index may differ by; `most` is the greatest value that the type holds: greater ones of the
+// source are it in the file.
+template <typename Allowed>
 void compare(const std::filesystem::path& path, const std::vector<float>& expected,
-             const std::vector<float>& found, double allowed, Difference& d,
+             const std::vector<float>& found, const Allowed& allowed, Difference& d,
              float most = std::numeric_limits<float>::infinity()) {
     if (expected.size() != found.size()) bad_file(path, "has another size than its source");
-    double largest = 0;
     for (std::size_t n = 0; n < expected.size(); ++n) {
         if (!std::isfinite(found[n])) bad_file(path, "holds a voxel that is no finite number");
         if (expected[n] > most) ++d.cut;
-        const double difference = std::abs(double(std::min(expected[n], most)) - double(found[n]));
-        largest = std::max(largest, difference);
-        d.squares += difference * difference;
+        add(double(std::min(expected[n], most)), double(found[n]), allowed(n), d);
     }
-    add(largest, allowed, expected.size(), d);
+    d.voxels += expected.size();
 }
 
-// Grids of the same extent, without room for the voxels between their clouds.
-void compare(const DensityGrid& expected, const DensityGrid& found, double allowed, Difference& d) {
-    double largest = 0;
+// Grids of the same extent, without room for the voxels between their clouds. `allowed` gives what a voxel of a value may differ by
+// in a block with a largest one.
+template <typename Allowed>
+void compare(const DensityGrid& expected, const DensityGrid& found, const Allowed& allowed, Difference& d) {
     expected.visit_blocks(found, [&](std::span<const float> a, std::span<const float> b) {
-        for (std::size_t n = 0; n < a.size(); ++n) {
-            const double difference = std::abs(double(a[n]) - double(b[n]));
-            largest = std::max(largest, difference);
-            d.squares += difference * difference;
-        }
+        const double largest = double(std::ranges::max(a));
+        for (std::size_t n = 0; n < a.size(); ++n)
+            add(double(a[n]), double(b[n]), allowed(double(a[n]), largest), d);
     });
-    add(largest, allowed, expected.extent().cells(), d);
+    d.voxels += expected.extent().cells();
 }
 
 // On the way to a code and back there are five roundings of floats.
 constexpr double kRoundings = 5 * 0x1p-24;
+constexpr double kSmallest = double(std::numeric_limits<float>::min());
 
-// Returns the error of codes that go to `scale`. Floats are exact to their bits and halves to their eleven, or half of their
-// smallest step, of values of which none is above `max`.
-double allowed_error(VoxelType type, double scale, double max) {
-    const bool is_float = type == VoxelType::r16f || type == VoxelType::r32f;
-    const double smallest = type == VoxelType::r16f ? 0x1.0001p-25 * scale : 0;
-    return (largest_error(type) * 1.0001 + kRoundings) * (is_float ? max : scale) + smallest +
-           double(std::numeric_limits<float>::min());
+// Codes go to `scale`. Floats are exact to their bits, and halves to their eleven, or half of their smallest step.
+Tolerance tolerance_of(VoxelType type, double scale) {
+    const double error = largest_error(type) * 1.0001 + kRoundings;
+    if (type == VoxelType::r16f) return {0x1.0001p-25 * scale + kSmallest, error};
+    if (type == VoxelType::r32f) return {kSmallest, error};
+    return {error * scale + kSmallest, 0};
 }
+
+// What each voxel of a block of BC4 may differ by: its steps go from the least to the greatest of 4 x 4 voxels of a slice, as they
+// are when what is above the scale is cut.
+class BlockTolerance {
+  public:
+    BlockTolerance(const Volume& volume, double scale) : volume_(volume), scale_(scale) {}
+    double operator()(std::size_t n) const {
+        const auto nx = std::size_t(volume_.nx), ny = std::size_t(volume_.ny);
+        const std::size_t x = n % nx / 4 * 4, y = n / nx % ny / 4 * 4, z = n / nx / ny;
+        float least = float(scale_), most = 0;
+        for (std::size_t j = y; j < std::min(y + 4, ny); ++j) {
+            const float* row = volume_.values.data() + (z * ny + j) * nx;
+            const auto [low, high] = std::minmax_element(row + x, row + std::min(x + 4, nx));
+            least = std::min(least, *low);
+            most = std::max(most, *high);
+        }
+        const double range = std::min(double(most), scale_) - double(least);
+        return (range / 14 + scale_ / 255) * 1.0001 + kRoundings * scale_ + kSmallest;
+    }
+
+  private:
+    const Volume& volume_;
+    double scale_;
+};
 
 // Throws ReadFailure unless there is room for what a comparison takes.
 void require_room(const std::filesystem::path& path, std::uint64_t bytes, const VolumeBox& box) {
@@ -118,12 +150,11 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
     return read_slices(path, nx, ny, nz, slice_columns(nx, ny, nz));
 }
 
-// Half a step of the codes of a leaf, which go from its least to its greatest value. The box has zeros, too.
-double allowed_error(NanoQuantise quantise, const DensityGrid& source) {
-    const double max = double(source.max_value());
-    if (quantise == NanoQuantise::none) return allowed_error(VoxelType::r32f, 1, max);
-    const double half_step = 1.001 / (quantise == NanoQuantise::fp8 ? 255 : 65535) / 2;
-    return max * (half_step + kRoundings) + double(std::numeric_limits<float>::min());
+// Half a step of the codes of a leaf, a block of the grid, which go from its least to its greatest value.
+double allowed_error(NanoQuantise quantise, double value, double largest) {
+    const double roundings = kRoundings * largest + kSmallest;
+    if (quantise == NanoQuantise::none) return kRoundings * value + kSmallest;
+    return largest * 1.001 / (quantise == NanoQuantise::fp8 ? 255 : 65535) / 2 + roundings;
 }
 
 // Returns whether a grid lies where it should, but for the rounding of the centre of its first voxel, which is what files hold.
@@ -153,8 +184,10 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         const DensityGrid expected = coarser(source, s.layout.factor);
         Placement at = expected.placement();
         if (file.format == "nvdb") {
-            compare(expected, read_nanovdb(path, expected.extent(), at), allowed_error(list.quantise, source),
-                    d);
+            compare(
+                expected, read_nanovdb(path, expected.extent(), at),
+                [&](double value, double largest) { return allowed_error(list.quantise, value, largest); },
+                d);
             return true;
         }
         const LoadedDensity loaded = load_density(path);
@@ -166,10 +199,9 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         if (!is_at(found.placement(), at)) bad_file(path, "lies at another place than its source");
         const auto type = list.types.find(file.format);
         if (!(found.extent() == expected.extent())) bad_file(path, "has another size than its source");
-        compare(expected, found,
-                allowed_error(type == list.types.end() ? VoxelType::r32f : type->second, 1,
-                              double(source.max_value())),
-                d);
+        const Tolerance t = tolerance_of(type == list.types.end() ? VoxelType::r32f : type->second, 1);
+        compare(
+            expected, found, [&](double value, double) { return t.absolute + t.relative * value; }, d);
         return true;
     }
     if (file.format == "flightgear") {
@@ -180,8 +212,9 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
                           found = read_cloud_picture(path);
         if (found.side != expected.side || found.height != expected.height)
             bad_file(path, "has another size than its source's cloud");
-        compare(path, {expected.codes.begin(), expected.codes.end()},
-                {found.codes.begin(), found.codes.end()}, 0, d);
+        compare(
+            path, {expected.codes.begin(), expected.codes.end()}, {found.codes.begin(), found.codes.end()},
+            [](std::size_t) { return 0.0; }, d);
         return true;
     }
     const auto type = list.types.find(file.format);
@@ -204,13 +237,21 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     Volume expected = lay_out(source, s.layout);
     const bool whole = encoded.type == VoxelType::r16f || encoded.type == VoxelType::r32f;
     const float most = whole ? std::max(s.scale, source.max_value()) : s.scale;
+    const Tolerance tolerance = tolerance_of(encoded.type, double(s.scale));
     for (const VolumeLevel& level : encoded.levels) {
         if (&level != &top) expected = halved(expected);
-        compare(path, expected.values,
-                decode(level.bytes.data(), level.bytes.size(), level.nx, level.ny, level.nz, encoded.type,
-                       s.scale)
-                    .values,
-                allowed_error(encoded.type, double(s.scale), double(source.max_value())), d, most);
+        const std::vector<float> found = decode(level.bytes.data(), level.bytes.size(), level.nx, level.ny,
+                                                level.nz, encoded.type, s.scale)
+                                             .values;
+        if (encoded.type == VoxelType::bc4)
+            compare(path, expected.values, found, BlockTolerance(expected, double(s.scale)), d, most);
+        else
+            compare(
+                path, expected.values, found,
+                [&](std::size_t n) {
+                    return tolerance.absolute + tolerance.relative * double(expected.values[n]);
+                },
+                d, most);
     }
     return true;
 }
@@ -250,9 +291,12 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
         const double rms = std::sqrt(d.squares / double(std::max<std::size_t>(1, d.voxels)));
         checks.push_back(
             {format,
-             d.passed,
-             fmt::format("{} files read back: largest difference {:.3g} (at most {:.3g}), rms {:.3g}{}",
+             d.too_far == 0,
+             fmt::format("{} files read back: largest difference {:.3g} (at most {:.3g}), rms {:.3g}{}{}",
                          counts[format], d.largest, d.allowed, rms,
+                         d.too_far > 0 ? fmt::format("; a voxel differs by {:.3g} instead of {:.3g} at most",
+                                                     d.too_far, d.instead_of)
+                                       : "",
                          d.cut > 0 ? fmt::format("; {} voxels above the scale are cut to it", d.cut) : ""),
              {{"largest", d.largest}, {"rms", rms}}});
     }

@@ -334,10 +334,11 @@ class Export(Case):
         self.call("export", "large.vdb", "--to", "raw", "--type", "r16f", "--range", "auto", "-o", "large")
         self.call("verify", "large")
 
-    def write_apart(self, side):
+    def write_apart(self, side, edge_m=1.0):
         """apart.vdb: two voxels at opposite corners of a box."""
         import pyopenvdb
         grid = pyopenvdb.FloatGrid()
+        grid.transform = pyopenvdb.createLinearTransform(edge_m)
         for place in ((0, 0, 0), (side - 1, side - 1, side - 1)):
             grid.getAccessor().setValueOn(place, 0.5)
         grid.name = "density"
@@ -490,12 +491,17 @@ class Export(Case):
             said = self.call("export", "thinner.vdb", *arguments, "-o", "thin").stderr
             found = re.search("nothing of it is left in ([a-z, ]+): its", said)
             self.assertEqual(found and found[1], lost, said)
+            self.assertEqual(self.call("export", "thinner.vdb", *arguments, "-o", "thin").stderr, said)  # of what is kept, too
             self.call("verify", "thin")
         # Codes of NanoVDB end where floats do.
         grid.copyFromArray(values * numpy.float32(1e-33))
         pyopenvdb.write(str(self.folder / "thinner.vdb"), [grid])
         self.refused(2, "export", "thinner.vdb", "--to", "nvdb", "--quantise", "fp8", "-o", "codes", says="takes grids from 3.8")
         self.assertEqual([path.name for path in (self.folder / "codes").iterdir() if path.is_file()], ["export.json"])
+        grid.copyFromArray((alone * numpy.float32(5e-34)).astype("f4"))
+        pyopenvdb.write(str(self.folder / "mean.vdb"), [grid])
+        self.call("export", "mean.vdb", "--to", "nvdb", "--quantise", "fp8", "-o", "fine")
+        self.refused(2, "export", "mean.vdb", "--to", "nvdb", "--quantise", "fp8", "--voxel", "4", "-o", "coarse", says="takes grids from 3.8")
         self.call("export", "thinner.vdb", "--to", "nvdb", "-o", "codes")  # as it says, into the folder that was not used
         self.call("verify", "codes")
         shutil.rmtree(self.folder / "thin")
@@ -504,6 +510,37 @@ class Export(Case):
         file.write_bytes(bytes(len(file.read_bytes())))
         self.relisted(self.folder / "thin", file.name)
         self.assertRegex(self.call("verify", "thin", status=1).stdout, "FAIL +raw")
+
+    def test_verify_notices_a_cloud_beside_a_denser_one(self):
+        """A voxel may differ by its own error alone, not by that of the greatest, which coarser voxels do not even have."""
+        import pyopenvdb
+
+        def write(name, greatest, haze):
+            values = numpy.zeros((24, 24, 24), "f4")
+            values[12:20, 12:20, 12:20] = haze * numpy.random.default_rng(5).random((8, 8, 8))
+            values[0, 0, 0] = values[-1, -1, -1] = greatest
+            grid = pyopenvdb.FloatGrid()
+            grid.copyFromArray(values)
+            grid.name = "density"
+            pyopenvdb.write(str(self.folder / name), [grid])
+        for greatest, haze, arguments in ((1e4, 4, ["--to", "raw", "--type", "r16f"]), (1e4, 4, ["--to", "vdb", "--type", "r16f"]),
+                                          (1e9, 250, ["--to", "vdb"]), (1e9, 250, ["--to", "nvdb"]), (1e9, 250, ["--to", "raw", "--mips"]),
+                                          (1e9, 250, ["--to", "vti"]), (1, 4e-4, ["--to", "bricks", "--type", "r16f"]),
+                                          (1, 0.05, ["--to", "raw", "--type", "bc4"]), (1, 0.0015, ["--to", "nvdb", "--quantise", "fp8"]),
+                                          (1, 0.001, ["--to", "raw", "--type", "r16f", "--voxel", "8"]),
+                                          (1, 0.001, ["--to", "nvdb", "--quantise", "fp8", "--voxel", "8"])):
+            with self.subTest(arguments=arguments):
+                for folder in ("whole", "robbed"):
+                    write("two.vdb", greatest, haze if folder == "whole" else 0)
+                    shutil.rmtree(self.folder / folder, ignore_errors=True)
+                    self.call("export", "two.vdb", *arguments, "-o", folder)
+                write("two.vdb", greatest, haze)
+                self.call("verify", "whole")
+                file, = (path for path in (self.folder / "whole").iterdir() if path.name.startswith("two_"))
+                shutil.copy(self.folder / "robbed" / file.name, file)
+                self.relisted(self.folder / "whole", file.name)
+                said = self.call("verify", "whole", status=1).stdout
+                self.assertIn("a voxel differs by", re.search("FAIL.*", said)[0])
 
     def test_values_above_one_are_verified(self):
         """In 16 bits, whose steps are hardly larger than what is rounded on the way to a code and back."""
@@ -782,7 +819,7 @@ class Export(Case):
             self.assertAlmostEqual(planned("--to", name, "--size", "8") * 64 / planned("--to", name), 1, delta=0.05)
 
     def test_advice_of_a_preset_can_be_followed(self):
-        self.write_apart(4094)
+        self.write_apart(4094, 0.4115226)
         error = self.refused(2, "export", "apart.vdb", "--for", "vulkan", "--border", "zero", "-o", "bad", says="give --voxel").stderr
         voxel = re.search("give --voxel ([0-9.]+) or", error)[1]
         side = max(json.loads(self.call("export", "apart.vdb", "--for", "vulkan", "--border", "zero", "--voxel", voxel, "--plan",
@@ -1079,6 +1116,7 @@ class Export(Case):
         plan = lambda *arguments: json.loads(self.call("export", "periodic", "--to", "raw", *arguments, "--plan", "--json").stdout)["sequences"][0]
         self.assertEqual(plan("--voxel", 4 * cell)["size"][:2], [8, 6])
         self.assertEqual(plan("--size", 7)["size"][:2], [4, 3])  # 5 voxels would do, and do not divide
+        self.refused(2, "export", "periodic", "--to", "raw", "--size", 3, "-o", "bad", says="has at least 4 voxels: whole tiles have to fit")
         said = self.call("export", "periodic", "--to", "raw", "--pad", "64", "--plan").stderr
         self.assertIn("not after its size", said)
         self.assertNotIn("not after its size", self.call("export", "run", "--to", "raw", "--pad", "64", "--plan").stderr)
