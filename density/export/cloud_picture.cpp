@@ -151,9 +151,9 @@ CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& perio
 std::uint64_t largest_cloud_bytes(const std::array<int, 3>& size, const std::array<bool, 3>& periodic,
                                   int factor, std::uint64_t positive) {
     const std::uint64_t voxels = std::uint64_t(size[0]) * std::uint64_t(size[1]) * std::uint64_t(size[2]);
-    // Marks; and members, of which a thirtieth is what the blocks of a deque take. All may be of one cloud.
+    // Marks; and members, with a fifteenth more that the blocks of a deque take. All may be of one cloud.
     const std::uint64_t members = sizeof(Member) * std::min(positive, voxels),
-                        cloud = voxels * sizeof(std::uint8_t) + members + members / 30;
+                        cloud = voxels * sizeof(std::uint8_t) + members + members / 15;
     // Sums and codes of the cloud's own box. Across periodic sides it may be larger than its sky.
     const int most = *std::rbegin(kSides), widest = std::min(most, std::max(size[0], size[1]));
     const auto side =

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What an export will write, under which names, and whether memory and disk hold it; nothing is written here (not installed).
+// Tells what an export will write, under which names, and whether memory and disk hold it; writes nothing (not installed).
 
 #include <cstdint>
 #include <optional>

@@ -37,12 +37,21 @@ VolumeBox cells_of(const ExportSequence& s) {
     return box_of(s.extent, {}, VolumeLayout{.factor = s.layout.factor});
 }
 
-// Voxels of whole leaves of OpenVDB.
+constexpr int kLeafEdge = 8;  // of OpenVDB
+
+// Voxels of whole leaves.
 std::uint64_t leaf_voxels(const std::array<int, 3>& size) {
-    constexpr int kLeafEdge = 8;
     std::uint64_t voxels = 1;
     for (const int side : size) voxels *= std::uint64_t(side + kLeafEdge - 1) / kLeafEdge * kLeafEdge;
     return voxels;
+}
+
+// Voxels of the leaves of a grid of the wind: all, or, of a wind that is one everywhere, those that reach out of the box.
+double wind_voxels(const ExportSequence& s) {
+    const std::array<int, 3> size = cells_of(s).size;
+    double inner = s.wind_fields.empty() && s.metadata.wind.size() <= 1 ? 1 : 0;
+    for (const int side : size) inner *= side / kLeafEdge * kLeafEdge;
+    return double(leaf_voxels(size)) - inner;
 }
 
 std::uint64_t cloud_bytes(const ExportSequence& s, std::uint64_t positive) {
@@ -134,19 +143,23 @@ void require_halves(const ExportOptions& options, const ExportSequence& s, const
     }
 }
 
-// Throws Error(usage) where values are so small that the library, which divides codes by the range of a leaf, finds infinity.
-void require_codes(const ExportOptions& options, const SourceFrame& frame, float largest) {
-    if (options.quantise == NanoQuantise::none || largest <= 0) return;
+// Throws Error(usage) where values, or their means, are so small that the library, which divides codes by the range of a leaf, finds
+// infinity.
+void require_codes(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
+                   const DensityGrid& density) {
+    if (options.quantise == NanoQuantise::none || density.max_value() <= 0) return;
     const float codes = options.quantise == NanoQuantise::fp8 ? 255 : 65535;
     // A leaf of a smaller range than codes / max float is lost in half of a code of the largest value.
     const float least = 2 * codes * codes / std::numeric_limits<float>::max();
+    const double factor = s.layout.factor;
+    if (double(density.max_value()) / (factor * factor * factor) >= double(least)) return;
+    const float largest = coarser(density, s.layout.factor).max_value();
     if (largest >= least) return;
     throw Error(
         ErrorCode::usage,
-        fmt::format(
-            "{}: its largest value, or mean, is {:g}, and --quantise takes grids from {:g} on: expected "
-            "--quantise none",
-            frame.file.string(), largest, least));
+        fmt::format("{}: its largest value, or mean, is {:g}, and --quantise takes grids from {:g} on: "
+                    "expected --quantise none",
+                    frame.file.string(), largest, least));
 }
 
 // Returns whether values up to `largest`, as a part of the scale, are all 0 in a type: below half of its first step, which a
@@ -176,6 +189,7 @@ ExportedFrame FrameExporter::write_files(const ExportSequence& s, const SourceFr
         throw Error(ErrorCode::io,
                     frame.file.string() + ": has another box than the first file of its sequence");
     require_halves(options_, s, frame, loaded.density.max_value());
+    require_codes(options_, s, frame, loaded.density);
     const ExportSource source{frame.file, file_digest(frame.file)};
     require_unchanged(frame);
     Encodings made;
@@ -234,9 +248,8 @@ bool FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
         return std::ranges::all_of(cloud.codes, [](std::uint8_t code) { return code == 0; });
     }
     if (format == ExportFormat::nvdb) {
-        const DensityGrid density = coarser(loaded.density, s.layout.factor);
-        require_codes(options_, frame, density.max_value());
-        write_nanovdb(path, density, options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
+        write_nanovdb(path, coarser(loaded.density, s.layout.factor),
+                      options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
         return false;
     }
     if (made.levels.empty()) made.levels = levels_of(loaded.density, s);
@@ -289,7 +302,7 @@ std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
         if (is_grid && s.layout.factor > 1) of_file = layout_bytes(cells_of(s).voxels(), s.layout.factor);
         if (format == ExportFormat::bricks) of_file = brick_work_bytes(sizes, options.brick_edge, type);
         if (format == ExportFormat::vdb && has_velocity(options, s))
-            of_file += std::uint64_t(velocity_bytes(double(leaf_voxels(cells_of(s).size))));
+            of_file += std::uint64_t(velocity_bytes(wind_voxels(s)));
         if (is_packed(options, format)) of_file = dense_bytes(options, s, format);
         passing = std::max(passing, of_file);
         has_boxes = has_boxes || is_dense(format);

@@ -34,7 +34,7 @@ struct Difference {
     throw Error(ErrorCode::io, path.string() + ": " + what);
 }
 
-// What a voxel may differ by: so much, and so much of its value.
+// Limits what a voxel may differ by: an absolute part, and one relative to its value.
 struct Tolerance {
     double absolute = 0, relative = 0;
 };
@@ -44,7 +44,7 @@ void add(double expected, double found, double allowed, Difference& d) {
     const double difference = std::abs(expected - found);
     d.largest = std::max(d.largest, difference);
     d.allowed = std::max(d.allowed, allowed);
-    if (difference > allowed && (d.too_far == 0 || difference * d.instead_of > d.too_far * allowed)) {
+    if (difference - allowed > d.too_far - d.instead_of) {
         d.too_far = difference;
         d.instead_of = allowed;
     }
@@ -86,11 +86,11 @@ constexpr double kSmallest = double(std::numeric_limits<float>::min());
 Tolerance tolerance_of(VoxelType type, double scale) {
     const double error = largest_error(type) * 1.0001 + kRoundings;
     if (type == VoxelType::r16f) return {0x1.0001p-25 * scale + kSmallest, error};
-    if (type == VoxelType::r32f) return {kSmallest, error};
+    if (type == VoxelType::r32f) return {0x1.0001p-150 * scale + kSmallest, error};
     return {error * scale + kSmallest, 0};
 }
 
-// What each voxel of a block of BC4 may differ by: its steps go from the least to the greatest of 4 x 4 voxels of a slice, as they
+// Gives what each voxel of a block of BC4 may differ by: its steps go from the least to the greatest of 4 x 4 voxels of a slice, as they
 // are when what is above the scale is cut.
 class BlockTolerance {
   public:
@@ -150,11 +150,13 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
     return read_slices(path, nx, ny, nz, slice_columns(nx, ny, nz));
 }
 
-// Half a step of the codes of a leaf, a block of the grid, which go from its least to its greatest value.
+// Returns half a step of the codes of a leaf, a block of the grid, which go from its least to its greatest value; or all that is
+// between them where the library finds infinity for its codes a unit.
 double allowed_error(NanoQuantise quantise, double value, double largest) {
-    const double roundings = kRoundings * largest + kSmallest;
     if (quantise == NanoQuantise::none) return kRoundings * value + kSmallest;
-    return largest * 1.001 / (quantise == NanoQuantise::fp8 ? 255 : 65535) / 2 + roundings;
+    const double codes = quantise == NanoQuantise::fp8 ? 255 : 65535;
+    const double least = codes / double(std::numeric_limits<float>::max());
+    return largest * 1.001 / codes / 2 + kRoundings * largest + 1.001 * std::min(largest, least) + kSmallest;
 }
 
 // Returns whether a grid lies where it should, but for the rounding of the centre of its first voxel, which is what files hold.

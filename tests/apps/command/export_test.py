@@ -498,6 +498,7 @@ class Export(Case):
         pyopenvdb.write(str(self.folder / "thinner.vdb"), [grid])
         self.refused(2, "export", "thinner.vdb", "--to", "nvdb", "--quantise", "fp8", "-o", "codes", says="takes grids from 3.8")
         self.assertEqual([path.name for path in (self.folder / "codes").iterdir() if path.is_file()], ["export.json"])
+        self.refused(2, "export", "thinner.vdb", "--to", "raw", "--to", "nvdb", "--quantise", "fp8", "-o", "codes", says="takes grids from 3.8")
         grid.copyFromArray((alone * numpy.float32(5e-34)).astype("f4"))
         pyopenvdb.write(str(self.folder / "mean.vdb"), [grid])
         self.call("export", "mean.vdb", "--to", "nvdb", "--quantise", "fp8", "-o", "fine")
@@ -541,6 +542,23 @@ class Export(Case):
                 self.relisted(self.folder / "whole", file.name)
                 said = self.call("verify", "whole", status=1).stdout
                 self.assertIn("a voxel differs by", re.search("FAIL.*", said)[0])
+
+    def test_verify_takes_what_the_formats_make_of_it(self):
+        """Also where a cloud ends in the least that floats hold, and their codes, or values of its scale, cannot be told apart."""
+        import pyopenvdb
+        x = numpy.arange(96) - 48
+        for largest, formats in ((1, (["--to", "nvdb", "--quantise", "fp8"], ["--to", "nvdb", "--quantise", "fp16"], ["--to", "dds"])),
+                                 (1e9, (["--to", "raw", "--type", "r32f", "--range", "auto", "--mips"], ["--to", "vti", "--range", "auto"],
+                                        ["--to", "raw", "--type", "r16f", "--range", "auto"], ["--to", "vdb", "--to", "nvdb", "--voxel", "3"]))):
+            values = largest * numpy.exp(-(x[:, None, None] ** 2 + x[None, :, None] ** 2 + x[None, None, :] ** 2) / 5.2**2)
+            grid = pyopenvdb.FloatGrid()
+            grid.copyFromArray(values.astype("f4"))
+            grid.name = "density"
+            pyopenvdb.write(str(self.folder / "gauss.vdb"), [grid])
+            for arguments in formats:
+                self.call("export", "gauss.vdb", *arguments, "-o", "gauss")
+                self.call("verify", "gauss")
+                shutil.rmtree(self.folder / "gauss")
 
     def test_values_above_one_are_verified(self):
         """In 16 bits, whose steps are hardly larger than what is rounded on the way to a code and back."""

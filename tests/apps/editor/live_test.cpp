@@ -187,6 +187,15 @@ TEST(LiveScene, FailuresAreSaidAndAnotherSceneGoesOn) {
     EXPECT_EQ(live.status().failure, "");
     live.seek(2);
     EXPECT_TRUE(comes([&] { return live.status().step == 2; }));
+    // Also while it is being made.
+    for (int n = 0; n < 10; ++n) {
+        live.start(huge, 5);
+        ASSERT_TRUE(comes([&] { return !live.status().failure.empty(); }));
+        live.change(small_scene());
+        std::this_thread::sleep_for(std::chrono::microseconds(200 * n));
+        live.seek(7);
+        ASSERT_TRUE(comes([&] { return live.status().step == 7; }));
+    }
 }
 
 std::string layer_text(const std::string& name) {
