@@ -162,12 +162,10 @@ void require_codes(const ExportOptions& options, const ExportSequence& s, const 
                     frame.file.string(), largest, least));
 }
 
-// Returns whether values up to `largest`, as a part of the scale, are all 0 in a type: below half of its first step, which a
-// half has to exceed.
-bool is_lost(VoxelType type, double largest) {
-    if (type == VoxelType::r32f) return false;
-    if (type == VoxelType::r16f) return largest <= 0x1p-25;
-    return largest < 0.5 / (type == VoxelType::r16 ? 65535 : 255);
+// Returns whether values above 0, of which none is above `largest`, are all 0 in a type.
+bool is_lost(VoxelType type, float largest, float scale) {
+    const std::vector<std::byte> code = encode({1, 1, 1, {largest}}, type, scale);
+    return std::ranges::all_of(code, [](std::byte byte) { return byte == std::byte{0}; });
 }
 
 }  // namespace
@@ -236,7 +234,7 @@ bool FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
                     frame.file.string() + ": was changed while it was exported: export it again");
     }
     if (format == ExportFormat::vdb)
-        return is_lost(type, double(write_vdb_file(path, options_, s, loaded, frame.time_s)));
+        return is_lost(type, write_vdb_file(path, options_, s, loaded, frame.time_s), 1);
     if (format == ExportFormat::flightgear) {
         VolumeLayout layout;
         layout.factor = s.layout.factor;
@@ -253,7 +251,7 @@ bool FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
         return false;
     }
     if (made.levels.empty()) made.levels = levels_of(loaded.density, s);
-    const bool lost = is_lost(type, double(std::ranges::max(made.levels.front().values)) / double(s.scale));
+    const bool lost = is_lost(type, std::ranges::max(made.levels.front().values), s.scale);
     if (format == ExportFormat::bricks) {
         write_bricks(path, made.levels, brick_options(options_, s, type));
         return lost;

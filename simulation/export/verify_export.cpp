@@ -106,7 +106,7 @@ class BlockTolerance {
             most = std::max(most, *high);
         }
         const double range = std::min(double(most), scale_) - double(least);
-        return (range / 14 + scale_ / 255) * 1.0001 + kRoundings * scale_ + kSmallest;
+        return (range / 14 + scale_ / 510 * (1 + 1.0 / 7)) * 1.0001 + kRoundings * scale_ + kSmallest;
     }
 
   private:
