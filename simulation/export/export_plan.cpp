@@ -138,7 +138,7 @@ void require_box(const ExportOptions& options, const ExportSequence& s) {
     require_memory(
         s.grid_bytes + std::size_t(box_bytes(options, s)),
         fmt::format("{}: a box of {} x {} x {} voxels (less with a larger --voxel; VDB and NanoVDB without "
-                    "--voxel, --size, --budget and --velocity need none)",
+                    "--voxel, --size, --budget and --velocity need that of their clouds alone)",
                     s.frames.front().file.string(), size[0], size[1], size[2]));
 }
 

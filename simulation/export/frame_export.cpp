@@ -46,6 +46,13 @@ std::uint64_t leaf_voxels(const std::array<int, 3>& size) {
     return voxels;
 }
 
+// The library's own grid, which has all leaves as floats first, and the file, which grows in memory to twice its size.
+std::uint64_t nanovdb_bytes(const ExportSequence& s) {
+    const std::uint64_t grid =
+        s.layout.factor > 1 ? sizeof(float) * leaf_voxels(cells_of(s).size) : std::uint64_t(s.grid_bytes);
+    return 3 * grid;
+}
+
 // Voxels of the leaves of a grid of the wind: all, or, of a wind that is one everywhere, those that reach out of the box.
 double wind_voxels(const ExportSequence& s) {
     const std::array<int, 3> size = cells_of(s).size;
@@ -246,9 +253,9 @@ bool FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
         return std::ranges::all_of(cloud.codes, [](std::uint8_t code) { return code == 0; });
     }
     if (format == ExportFormat::nvdb) {
-        write_nanovdb(path, coarser(loaded.density, s.layout.factor),
-                      options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
-        return false;
+        const DensityGrid density = coarser(loaded.density, s.layout.factor);
+        write_nanovdb(path, density, options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
+        return density.max_value() <= 0;  // means of the least of floats
     }
     if (made.levels.empty()) made.levels = levels_of(loaded.density, s);
     const bool lost = is_lost(type, std::ranges::max(made.levels.front().values), s.scale);
@@ -298,6 +305,7 @@ std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
         std::uint64_t of_file = 0;
         if (format == ExportFormat::flightgear) of_file = cloud_bytes(s, 0);
         if (is_grid && s.layout.factor > 1) of_file = layout_bytes(cells_of(s).voxels(), s.layout.factor);
+        if (format == ExportFormat::nvdb) of_file += nanovdb_bytes(s);
         if (format == ExportFormat::bricks) of_file = brick_work_bytes(sizes, options.brick_edge, type);
         if (format == ExportFormat::vdb && has_velocity(options, s))
             of_file += std::uint64_t(velocity_bytes(wind_voxels(s)));

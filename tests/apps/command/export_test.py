@@ -829,7 +829,7 @@ class Export(Case):
             status, text = self.limited(mebibytes, "export", "full.vdb", "--to", "nvdb", "-o", "again")
             self.assertNotIn("Failed to", text)
             told.add(status)
-        self.assertLessEqual({0, 3}, told)
+        self.assertLessEqual({0, 2, 3}, told)
 
     def test_plans_are_of_coarser_voxels(self):
         planned = lambda *arguments: json.loads(self.call("export", "run", *arguments, "--plan", "--json").stdout)["sequences"][0]["estimated_bytes_a_frame"]
