@@ -13,6 +13,9 @@ namespace nephos {
 enum class NanoCodec { none, zip, blosc };    // compression of the file
 enum class NanoQuantise { none, fp8, fp16 };  // bits of a value, by the range of its leaf
 
+// Returns the largest code of a value; of fp8 or fp16.
+constexpr int largest_code(NanoQuantise quantise) { return quantise == NanoQuantise::fp8 ? 255 : 65535; }
+
 // Writes atomically. Throws Error(io) naming the file. Thread-safe for different files.
 void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
                    NanoQuantise quantise);

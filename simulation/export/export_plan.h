@@ -29,6 +29,7 @@ void require_space(const ExportOptions& options, const std::vector<ExportSequenc
 // Throws Error(usage) unless memory holds the box of a sequence: a sparse file may have any, whose voxels many formats hold all.
 void require_box(const ExportOptions& options, const ExportSequence& sequence);
 
+// Names of files: of the steps, and, behind that of the scene, of CIGI's packets.
 inline constexpr const char *kReadme = "README.txt", *kPackets = ".cigi";
 
 std::string sidecar_name(const ExportSequence& sequence);

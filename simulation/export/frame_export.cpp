@@ -155,7 +155,7 @@ void require_halves(const ExportOptions& options, const ExportSequence& s, const
 void require_codes(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
                    const DensityGrid& density) {
     if (options.quantise == NanoQuantise::none || density.max_value() <= 0) return;
-    const float codes = options.quantise == NanoQuantise::fp8 ? 255 : 65535;
+    const auto codes = float(largest_code(options.quantise));
     // A leaf of a smaller range than codes / max float is lost in half of a code of the largest value.
     const float least = 2 * codes * codes / std::numeric_limits<float>::max();
     const double factor = s.layout.factor;

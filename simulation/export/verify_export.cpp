@@ -37,6 +37,7 @@ struct Difference {
 // Limits what a voxel may differ by: an absolute part, and one relative to its value.
 struct Tolerance {
     double absolute = 0, relative = 0;
+    double of(double value) const { return absolute + relative * value; }
 };
 
 // Adds the difference of a voxel.
@@ -154,7 +155,7 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
 // between them where the library finds infinity for its codes a unit.
 double allowed_error(NanoQuantise quantise, double value, double largest) {
     if (quantise == NanoQuantise::none) return kRoundings * value + kSmallest;
-    const double codes = quantise == NanoQuantise::fp8 ? 255 : 65535;
+    const double codes = largest_code(quantise);
     const double least = codes / double(std::numeric_limits<float>::max());
     return largest * 1.001 / codes / 2 + kRoundings * largest + 1.001 * std::min(largest, least) + kSmallest;
 }
@@ -203,7 +204,7 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         if (!(found.extent() == expected.extent())) bad_file(path, "has another size than its source");
         const Tolerance t = tolerance_of(type == list.types.end() ? VoxelType::r32f : type->second, 1);
         compare(
-            expected, found, [&](double value, double) { return t.absolute + t.relative * value; }, d);
+            expected, found, [&](double value, double) { return t.of(value); }, d);
         return true;
     }
     if (file.format == "flightgear") {
@@ -250,10 +251,7 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         else
             compare(
                 path, expected.values, found,
-                [&](std::size_t n) {
-                    return tolerance.absolute + tolerance.relative * double(expected.values[n]);
-                },
-                d, most);
+                [&](std::size_t n) { return tolerance.of(double(expected.values[n])); }, d, most);
     }
     return true;
 }
