@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/run_listing.h"
 
-#include <system_error>
-
 #include <nlohmann/json.hpp>
 
-#include "core/descriptor.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "scenes/format/reader.h"
 #include "simulation/checked_json.h"
 
@@ -31,9 +29,7 @@ ListedFrame frame_of(const Json& json, const std::filesystem::path& manifest) {
 }  // namespace
 
 bool is_run_folder(const std::filesystem::path& folder) {
-    std::error_code error;
-    const std::filesystem::path manifest = folder / "manifest.json";
-    return is_there(manifest) && std::filesystem::is_regular_file(manifest, error);
+    return type_behind(folder / "manifest.json") == std::filesystem::file_type::regular;
 }
 
 RunListing read_run(const std::filesystem::path& folder) {

@@ -38,7 +38,7 @@ struct RunListing {
     std::optional<BranchPoint> branch;  // of a run that branched off another one
 };
 
-// Returns true when the folder has a manifest of a run.
+// Returns true when the folder has a manifest of a run. Throws ReadFailure where the system cannot say.
 bool is_run_folder(const std::filesystem::path& folder);
 
 // Reads DIR/manifest.json. Throws Error(io) naming it when it cannot be read, is no manifest of this version, or holds

@@ -120,9 +120,8 @@ nlohmann::ordered_json json_of(const ExportReport& report) {
             {"files", report.files.size()}, {"written", report.written},           {"kept", report.kept}};
 }
 
-void print_plan(const ExportOptions& options, const ExportReport& report, bool plan) {
-    Output output;
-    for (const PlannedSequence& s : report.sequences) {
+void print_volumes(const std::vector<PlannedSequence>& sequences, Output& output) {
+    for (const PlannedSequence& s : sequences) {
         const auto& box = s.box;
         output.line(fmt::format(
             "{}: {} frame{}, {} x {} x {} voxels of {:g} m{}{}", s.name, s.frames, s.frames == 1 ? "" : "s",
@@ -130,9 +129,20 @@ void print_plan(const ExportOptions& options, const ExportReport& report, bool p
             s.levels > 1 ? fmt::format(", {} levels", s.levels) : "",
             s.bytes_a_frame > 0 ? ", " + bytes_text(std::size_t(s.bytes_a_frame)) + " a frame" : ""));
     }
+}
+
+std::string planned_size(const ExportReport& report, bool has_volumes) {
+    if (!has_volumes) return "summaries of weather alone, of which each frame takes some kilobytes at most";
+    return bytes_text(std::size_t(report.needed_bytes)) + " in all" +
+           (report.sequences.front().estimated_bytes > 0 ? " (estimated)" : "");
+}
+
+void print_plan(const ExportOptions& options, const ExportReport& report, bool plan) {
+    Output output;
+    const bool has_volumes = !options.formats.empty();
+    if (has_volumes) print_volumes(report.sequences, output);
     output.line(
-        plan ? fmt::format("{} in all{}; nothing was written", bytes_text(std::size_t(report.needed_bytes)),
-                           report.sequences.front().estimated_bytes > 0 ? " (estimated)" : "")
+        plan ? planned_size(report, has_volumes) + "; nothing was written"
              : fmt::format("{}: {} files written{}; README.txt has the steps", options.folder.string(),
                            report.written,
                            report.kept > 0 ? fmt::format(", {} were there already", report.kept) : ""));

@@ -230,7 +230,13 @@ void write_texts(const ExportOptions& options, const std::optional<RunListing>& 
 ExportReport plan_export(const ExportOptions& options) {
     check_options(options);
     std::vector<std::string> notes;
-    ExportReport report = report_of(options, list_sequences(options, run_of(options), notes));
+    const std::vector<ExportSequence> sequences = list_sequences(options, run_of(options), notes);
+    try {
+        require_room(options, sequences);
+    } catch (const Error& error) {  // here and now: the plan may be for another machine
+        notes.push_back(std::string(error.what()) + ": an export would be refused");
+    }
+    ExportReport report = report_of(options, sequences);
     report.notes = std::move(notes);
     return report;
 }
@@ -242,8 +248,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     std::vector<ExportSequence> sequences = list_sequences(options, run, notes);
     if (options.weather.empty()) run.reset();  // it is for weather alone from here on
     ExportReport report = report_of(options, sequences);
-    require_space(options, sequences);
-    for (const ExportSequence& s : sequences) require_box(options, s);
+    require_room(options, sequences);
     GridReader reader(options);
     const std::vector<ListedFrame> of_weather =
         run ? frames_of_weather(options, *run) : std::vector<ListedFrame>();

@@ -59,6 +59,40 @@ PlannedSequence planned(const ExportOptions& options, const ExportSequence& s) {
     return plan;
 }
 
+void require_space(const ExportOptions& options, const std::vector<ExportSequence>& sequences) {
+    std::uint64_t bytes = 0;
+    for (const ExportSequence& s : sequences) {
+        for (const ExportFormat format : all_formats(options)) {
+            if (!has_known_size(options, format)) continue;
+            const std::uint64_t of_file = dense_bytes(options, s, format);
+            for (const SourceFrame& frame : s.frames) {
+                std::error_code none;
+                const std::uintmax_t there =
+                    std::filesystem::file_size(options.folder / frame_name(s, frame.number, format), none);
+                bytes += of_file - (none ? 0 : std::min<std::uint64_t>(of_file, there));
+            }
+        }
+    }
+    std::filesystem::path at = std::filesystem::absolute(options.folder);
+    while (!std::filesystem::exists(at) && at.has_parent_path() && at != at.parent_path())
+        at = at.parent_path();
+    std::error_code error;
+    const auto space = std::filesystem::space(at, error);
+    if (error || space.available >= bytes) return;
+    throw Error(ErrorCode::io,
+                fmt::format("{}: the export takes at least {}, but only {} are free", options.folder.string(),
+                            bytes_text(std::size_t(bytes)), bytes_text(std::size_t(space.available))));
+}
+
+void require_box(const ExportOptions& options, const ExportSequence& s) {
+    const std::array<int, 3> size = box_of(s.extent, s.placement, s.layout).size;
+    require_memory(
+        s.grid_bytes + std::size_t(box_bytes(options, s)),
+        fmt::format("{}: a box of {} x {} x {} voxels (less with a larger --voxel; VDB and NanoVDB without "
+                    "--voxel, --size, --budget and --velocity need that of their clouds alone)",
+                    s.frames.front().file.string(), size[0], size[1], size[2]));
+}
+
 }  // namespace
 
 void check_options(const ExportOptions& o) {
@@ -108,38 +142,9 @@ bool cuts_values(const ExportOptions& options) {
     });
 }
 
-void require_space(const ExportOptions& options, const std::vector<ExportSequence>& sequences) {
-    std::uint64_t bytes = 0;
-    for (const ExportSequence& s : sequences) {
-        for (const ExportFormat format : all_formats(options)) {
-            if (!has_known_size(options, format)) continue;
-            const std::uint64_t of_file = dense_bytes(options, s, format);
-            for (const SourceFrame& frame : s.frames) {
-                std::error_code none;
-                const std::uintmax_t there =
-                    std::filesystem::file_size(options.folder / frame_name(s, frame.number, format), none);
-                bytes += of_file - (none ? 0 : std::min<std::uint64_t>(of_file, there));
-            }
-        }
-    }
-    std::filesystem::path at = std::filesystem::absolute(options.folder);
-    while (!std::filesystem::exists(at) && at.has_parent_path() && at != at.parent_path())
-        at = at.parent_path();
-    std::error_code error;
-    const auto space = std::filesystem::space(at, error);
-    if (error || space.available >= bytes) return;
-    throw Error(ErrorCode::io,
-                fmt::format("{}: the export takes at least {}, but only {} are free", options.folder.string(),
-                            bytes_text(std::size_t(bytes)), bytes_text(std::size_t(space.available))));
-}
-
-void require_box(const ExportOptions& options, const ExportSequence& s) {
-    const std::array<int, 3> size = box_of(s.extent, s.placement, s.layout).size;
-    require_memory(
-        s.grid_bytes + std::size_t(box_bytes(options, s)),
-        fmt::format("{}: a box of {} x {} x {} voxels (less with a larger --voxel; VDB and NanoVDB without "
-                    "--voxel, --size, --budget and --velocity need that of their clouds alone)",
-                    s.frames.front().file.string(), size[0], size[1], size[2]));
+void require_room(const ExportOptions& options, const std::vector<ExportSequence>& sequences) {
+    require_space(options, sequences);
+    for (const ExportSequence& s : sequences) require_box(options, s);
 }
 
 std::string sidecar_name(const ExportSequence& s) { return s.name + ".volume.json"; }

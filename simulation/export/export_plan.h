@@ -23,11 +23,9 @@ ExportReport report_of(const ExportOptions& options, const std::vector<ExportSeq
 bool cuts_values(const ExportOptions& options);
 
 // Throws Error(io) unless the disk that holds the folder, or will, has room for the files whose size is known; of an export that
-// goes on, those of them that it has written already are not counted again.
-void require_space(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
-
-// Throws Error(usage) unless memory holds the box of a sequence: a sparse file may have any, whose voxels many formats hold all.
-void require_box(const ExportOptions& options, const ExportSequence& sequence);
+// goes on, those of them that it has written already are not counted again. Throws Error(usage) unless memory holds the box of
+// each sequence: a sparse file may have any, whose voxels many formats hold all.
+void require_room(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
 
 // Names of files: of the steps, and, behind that of the scene, of CIGI's packets.
 inline constexpr const char *kReadme = "README.txt", *kPackets = ".cigi";

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/paths.h"
 #include "core/text.h"
 #include "density/export/bricks.h"
 #include "scenes/format/text.h"
@@ -417,8 +418,8 @@ void look_at_weather(const RunListing& run, std::vector<std::string>& notes) {
 }  // namespace
 
 std::optional<RunListing> run_of(const ExportOptions& options) {
-    std::error_code error;
-    if (!options.files.empty() || !std::filesystem::is_directory(options.source, error)) return std::nullopt;
+    if (!options.files.empty() || type_behind(options.source) != std::filesystem::file_type::directory)
+        return std::nullopt;
     if (!is_run_folder(options.source))
         throw Error(ErrorCode::io,
                     options.source.string() + ": is no folder of a run (it has no manifest.json)");

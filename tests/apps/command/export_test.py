@@ -349,7 +349,10 @@ class Export(Case):
         self.write_apart(16000)
         for side, arguments in ((16000, ["--to", "flightgear"]), (8000, ["--to", "nvdb", "--voxel", "2"]), (8000, ["--to", "vdb", "--voxel", "2"])):
             self.refused(2, "export", "apart.vdb", *arguments, "-o", "apart", says=f"apart.vdb: a box of {side} x {side} x {side} voxels")
+            planned = self.call("export", "apart.vdb", *arguments, "-o", "apart", "--plan").stderr
+            self.assertRegex(planned, f"note: apart.vdb: a box of {side} x .* are all there is: an export would be refused")
             self.assertFalse((self.folder / "apart").exists())
+        self.assertEqual(self.call("export", "apart.vdb", "--to", "vdb", "--plan").stderr, "")
         self.call("export", "apart.vdb", "--to", "vdb", "--to", "nvdb", "-o", "apart")
         self.call("verify", "apart")
 
@@ -835,6 +838,11 @@ class Export(Case):
         planned = lambda *arguments: json.loads(self.call("export", "run", *arguments, "--plan", "--json").stdout)["sequences"][0]["estimated_bytes_a_frame"]
         for name in ("vdb", "flightgear"):
             self.assertAlmostEqual(planned("--to", name, "--size", "8") * 64 / planned("--to", name), 1, delta=0.05)
+
+    def test_a_plan_of_weather_alone_has_no_volumes(self):
+        said = self.call("export", "run", "--to", "metar", "--plan").stdout
+        self.assertRegex(said, r"^summaries of weather alone, .*; nothing was written\n$")
+        self.assertIn(" in all (estimated); nothing", self.call("export", "run", "--to", "metar", "--to", "vdb", "--plan").stdout)
 
     def test_advice_of_a_preset_can_be_followed(self):
         self.write_apart(4094, 0.4115226)

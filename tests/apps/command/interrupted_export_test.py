@@ -186,6 +186,12 @@ class InterruptedExport(Case):
             self.export("out", "--to", "raw")
             shutil.rmtree(self.folder / "out")
 
+    def test_a_run_that_cannot_be_examined_is_still_one(self):
+        for path in ("run/manifest.json", "run"):
+            for number in range(1, 5):
+                error = self.faulty(f"stat EIO {number} 1", path, "--to", "raw", "--to", "metar", "-o", "out", status=3)
+                self.assertRegex(error, "^error: run(/manifest.json)?: cannot examine: Input/output error\n")
+
     def test_a_folder_put_there_meanwhile_stays(self):
         """Where an export has looked for its hidden folder, and not made it yet; whoever owns it."""
         for was_killed in (False, True):
