@@ -143,7 +143,7 @@ void keep_checkpoint(Editor& editor) {
 }
 
 void back_to_checkpoint(Editor& editor) {
-    const std::uint64_t now = editor.live->status().step;
+    const std::uint64_t now = step_to_go_from(editor);
     const auto next = std::ranges::lower_bound(editor.checkpoints, now);
     if (next == editor.checkpoints.begin()) {
         say(editor,

@@ -257,7 +257,7 @@ std::vector<LiveStep> LiveScene::steps(std::uint64_t from) const {
 void LiveScene::fail(const std::string& what) {
     is_advancing_ = stops_here_ = false;
     forget_simulation();
-    if (new_scene_) return;  // another was started meanwhile: nobody looks at this one
+    if (new_scene_ || clear_) return;  // another takes its place: nobody looks at this one
     status_.failure = what;
     goal_ = status_.step;
     drawing_due_.notify_all();  // the last picture gets its detail

@@ -335,6 +335,7 @@ bool go_to_cloud(Editor& editor, const ImVec2& mouse);
 
 // timeline.cpp: a step that is gone to, and stood at. Steps on and back count from the one that is gone to: keys in turn are
 // as many steps, however long one takes.
+std::uint64_t step_to_go_from(const Editor& editor);
 void go_to_step(Editor& editor, std::uint64_t step);
 void step_on(Editor& editor);
 void step_back(Editor& editor);
@@ -342,7 +343,7 @@ void step_back(Editor& editor);
 // key_frames.cpp: marks below the time line's slider, `from` on in the window; checkpoints that the user set.
 void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last_step);
 void keep_checkpoint(Editor& editor);     // at the step that is shown
-void back_to_checkpoint(Editor& editor);  // the last before the present step
+void back_to_checkpoint(Editor& editor);  // the last before the step that steps count from
 
 // simulations.cpp: scenes that are open, each with its simulation.
 void simulations_list(Editor& editor);

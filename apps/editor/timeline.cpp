@@ -117,12 +117,6 @@ void plot(Editor& editor, const char* title, const char* unit, std::span<const C
     if (ImGui::IsMouseDown(ImGuiMouseButton_Left)) go_to_step(editor, step);
 }
 
-// Returns the step that steps on and back count from.
-std::uint64_t step_to_go_from(const Editor& editor) {
-    const LiveStatus status = editor.live->status();
-    return status.running ? status.step : status.goal;
-}
-
 void transport(Editor& editor) {
     if (button(editor, editor.running ? "Pause" : "Run", "Run or pause (Space)")) {
         editor.live->run(editor.running = !editor.running);
@@ -154,9 +148,14 @@ void transport(Editor& editor) {
 
 }  // namespace
 
+std::uint64_t step_to_go_from(const Editor& editor) {
+    const LiveStatus status = editor.live->status();
+    return status.running ? status.step : status.goal;
+}
+
 void go_to_step(Editor& editor, std::uint64_t step) {
     editor.live->run(editor.running = false);
-    editor.live->seek(step);
+    if (editor.shown_scene) editor.live->seek(step);
 }
 
 void step_on(Editor& editor) { go_to_step(editor, step_to_go_from(editor) + 1); }
