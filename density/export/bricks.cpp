@@ -2,14 +2,18 @@
 #include "density/export/bricks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "core/atomic_file.h"
 #include "core/bytes.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "density/export/whole_file.h"
 
 namespace nephos {
@@ -75,6 +79,23 @@ Volume brick_of(const Volume& level, const std::array<int, 3>& first, const Bric
     return brick;
 }
 
+// Calls `visit` with the place of each brick in the order of files.
+void for_each_brick(const std::vector<Volume>& levels, int edge,
+                    const std::function<void(const Entry&)>& visit) {
+    for (std::size_t n = 0; n < levels.size(); ++n)
+        for (int k = 0; k < bricks_along(levels[n].nz, edge); ++k)
+            for (int j = 0; j < bricks_along(levels[n].ny, edge); ++j)
+                for (int i = 0; i < bricks_along(levels[n].nx, edge); ++i)
+                    visit({.level = std::uint32_t(n),
+                           .i = std::uint32_t(i),
+                           .j = std::uint32_t(j),
+                           .k = std::uint32_t(k)});
+}
+
+std::array<int, 3> first_voxel(const Entry& entry, int edge) {
+    return {int(entry.i) * edge, int(entry.j) * edge, int(entry.k) * edge};
+}
+
 // The least and the largest value, in lanes that the compiler makes vectors of.
 std::pair<float, float> range_of(const std::vector<float>& values) {
     constexpr std::size_t kLanes = 16;
@@ -127,34 +148,17 @@ void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
     std::vector<Entry> entries;
     std::size_t kept = 0;
     std::vector<std::vector<std::byte>> data;
-    for (std::size_t n = 0; n < levels.size(); ++n) {
-        const Volume& level = levels[n];
-        for (int k = 0; k < bricks_along(level.nz, options.edge); ++k) {
-            for (int j = 0; j < bricks_along(level.ny, options.edge); ++j) {
-                for (int i = 0; i < bricks_along(level.nx, options.edge); ++i) {
-                    const Volume brick =
-                        brick_of(level, {i * options.edge, j * options.edge, k * options.edge}, options);
-                    const auto [min, max] = range_of(brick.values);
-                    Entry entry{std::uint32_t(n),
-                                std::uint32_t(i),
-                                std::uint32_t(j),
-                                std::uint32_t(k),
-                                0,
-                                0,
-                                min,
-                                max};
-                    const std::size_t bytes =
-                        max > 0 ? encoded_bytes(brick.nx, brick.ny, brick.nz, options.type) : 0;
-                    const bool keep = bytes > 0 && kept + bytes <= kMostKept;
-                    data.push_back(keep ? encode(brick, options.type, options.scale)
-                                        : std::vector<std::byte>());
-                    if (keep) kept += bytes;
-                    entry.bytes = bytes;
-                    entries.push_back(entry);
-                }
-            }
-        }
-    }
+    for_each_brick(levels, options.edge, [&](Entry entry) {
+        const Volume brick = brick_of(levels[entry.level], first_voxel(entry, options.edge), options);
+        std::tie(entry.min, entry.max) = range_of(brick.values);
+        const std::size_t bytes =
+            entry.max > 0 ? encoded_bytes(brick.nx, brick.ny, brick.nz, options.type) : 0;
+        const bool keep = bytes > 0 && kept + bytes <= kMostKept;
+        data.push_back(keep ? encode(brick, options.type, options.scale) : std::vector<std::byte>());
+        if (keep) kept += bytes;
+        entry.bytes = bytes;
+        entries.push_back(entry);
+    });
     ByteWriter head;
     head.put(kMark);
     for (const int number : {int(options.type), options.edge, kBorder, int(levels.size())})
@@ -180,11 +184,11 @@ void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
         for (std::size_t n = 0; n < entries.size(); ++n) {
             const Entry& e = entries[n];
             if (e.bytes == 0) continue;
-            const std::array<int, 3> first{int(e.i) * options.edge, int(e.j) * options.edge, int(e.k) * options.edge};
             if (!data[n].empty())
                 piece(data[n]);
             else
-                piece(encode(brick_of(levels[e.level], first, options), options.type, options.scale));
+                piece(encode(brick_of(levels[e.level], first_voxel(e, options.edge), options), options.type,
+                             options.scale));
         }
     });
 }
@@ -195,7 +199,7 @@ namespace {
 
 // The part of a file before its table.
 struct Head {
-    EncodedVolume volume;  // levels of zeros
+    EncodedVolume volume;  // levels without bytes
     int edge = 0;
     std::uint64_t bricks = 0;
 };
@@ -235,8 +239,6 @@ Head read_head(ByteReader& reader, std::size_t file_bytes, std::uint64_t known_b
         head.volume.levels.push_back({size[0], size[1], size[2], {}});
     }
     if (count != head.bricks) bad("its number of bricks does not fit its sizes");
-    for (VolumeLevel& level : head.volume.levels)
-        level.bytes.resize(encoded_bytes(level.nx, level.ny, level.nz, head.volume.type));
     return head;
 }
 
@@ -249,6 +251,35 @@ Entry read_entry(ByteReader& reader) {
     entry.min = reader.get<float>();
     entry.max = reader.get<float>();
     return entry;
+}
+
+[[noreturn]] void bad_brick(std::uint64_t n, const std::string& what) {
+    bad("brick " + std::to_string(n) + " " + what);
+}
+
+// The range that a brick states may be of means that were rounded otherwise.
+void require_range(std::uint64_t n, const Entry& entry, const std::pair<float, float>& range) {
+    const double slack = 1e-6 * double(range.second) + double(std::numeric_limits<float>::min());
+    if (std::abs(double(entry.min) - double(range.first)) <= slack &&
+        std::abs(double(entry.max) - double(range.second)) <= slack)
+        return;
+    const auto text = [](float low, float high) {
+        return number_text(low, 6) + " to " + number_text(high, 6);
+    };
+    bad_brick(n, "states values from " + text(entry.min, entry.max) + ", and has " +
+                     text(range.first, range.second));
+}
+
+// Returns the codes of brick n, in its order in the table; none of an empty one.
+std::span<const std::byte> brick_in(std::span<const std::byte> file, const Head& head, const Entry& entry,
+                                    std::uint64_t n) {
+    if (entry.bytes == 0) return {};
+    const int side = head.edge + 2 * kBorder;
+    if (entry.level >= head.volume.levels.size() ||
+        entry.bytes != encoded_bytes(side, side, side, head.volume.type) || entry.offset > file.size() ||
+        file.size() - entry.offset < entry.bytes)
+        bad_brick(n, "lies outside of the file");
+    return file.subspan(entry.offset, entry.bytes);
 }
 
 // Copies the voxels of a brick without its border into its level.
@@ -280,18 +311,52 @@ EncodedVolume read_bricks(const std::filesystem::path& path, std::uint64_t known
     return with_whole_file(path, [known_bytes](ByteReader& reader) {
         const std::span<const std::byte> file = reader.rest();
         Head head = read_head(reader, file.size(), known_bytes);
-        const std::size_t voxel = encoded_bytes(1, 1, 1, head.volume.type),
-                          side = std::size_t(head.edge) + 2 * kBorder;
+        for (VolumeLevel& level : head.volume.levels)
+            level.bytes.resize(encoded_bytes(level.nx, level.ny, level.nz, head.volume.type));
+        const std::size_t voxel = encoded_bytes(1, 1, 1, head.volume.type);
         for (std::uint64_t n = 0; n < head.bricks; ++n) {
             const Entry entry = read_entry(reader);
-            if (entry.bytes == 0) continue;
-            if (entry.level >= head.volume.levels.size() || entry.bytes != side * side * side * voxel ||
-                entry.offset > file.size() || file.size() - entry.offset < entry.bytes)
-                bad("brick " + std::to_string(n) + " lies outside of it");
-            place_brick(entry, file.subspan(entry.offset, entry.bytes), head.edge,
-                        head.volume.levels[entry.level], voxel);
+            const std::span<const std::byte> brick = brick_in(file, head, entry, n);
+            if (brick.empty()) continue;
+            place_brick(entry, brick, head.edge, head.volume.levels[entry.level], voxel);
         }
         return std::move(head.volume);
+    });
+}
+
+void check_bricks(const std::filesystem::path& path, const std::vector<Volume>& levels,
+                  const BrickOptions& options, float most, const std::function<double(float)>& allowed) {
+    std::uint64_t voxels = 0;
+    for (const Volume& level : levels) voxels += level.voxels();
+    with_whole_file(path, [&](ByteReader& reader) {
+        const std::span<const std::byte> file = reader.rest();
+        const Head head = read_head(reader, file.size(), sizeof(float) * voxels);
+        if (head.edge != options.edge || head.volume.type != options.type ||
+            head.volume.levels.size() != levels.size())
+            bad("its bricks are of another edge or type, or of other levels");
+        std::uint64_t n = 0;
+        for_each_brick(levels, options.edge, [&](const Entry& expected) {
+            const Entry entry = read_entry(reader);
+            if (std::tie(entry.level, entry.i, entry.j, entry.k) !=
+                std::tie(expected.level, expected.i, expected.j, expected.k))
+                bad_brick(n, "is another one than its place says");
+            const Volume brick = brick_of(levels[entry.level], first_voxel(entry, options.edge), options);
+            require_range(n, entry, range_of(brick.values));
+            const std::span<const std::byte> codes = brick_in(file, head, entry, n);
+            std::vector<float> found(brick.values.size(), 0.0f);
+            if (!codes.empty())
+                found = decode(codes.data(), codes.size(), brick.nx, brick.ny, brick.nz, options.type,
+                               options.scale)
+                            .values;
+            for (std::size_t v = 0; v < found.size(); ++v) {
+                const float value = std::min(brick.values[v], most);
+                if (!(std::abs(double(found[v]) - double(value)) <= allowed(value)))
+                    bad_brick(n, "or its border has " + number_text(found[v], 6) + " in place of " +
+                                     number_text(value, 6));
+            }
+            ++n;
+        });
+        return n;
     });
 }
 

@@ -21,6 +21,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "density/export/containers.h"
@@ -42,6 +43,11 @@ void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
 // Returns the levels put together from the bricks. A file whose levels take more than 256 MiB and 2,000 times its own bytes
 // is refused before memory is taken, unless they take no more than it is known to hold.
 EncodedVolume read_bricks(const std::filesystem::path& path, std::uint64_t known_bytes = 0);
+
+// Throws Error(io) naming the file unless each brick that read_bricks() takes has, with its border, the voxels of these levels and
+// their range. `allowed` gives what a voxel may differ by in the file; greater values than `most` are it there.
+void check_bricks(const std::filesystem::path& path, const std::vector<Volume>& levels,
+                  const BrickOptions& options, float most, const std::function<double(float)>& allowed);
 
 // Returns the most bytes that a file of these levels takes.
 std::uint64_t most_brick_bytes(const std::vector<std::array<int, 3>>& sizes, int edge, VoxelType type);

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <deque>
+#include <optional>
 
 #include <png.h>
 
@@ -120,7 +121,8 @@ class Clouds {
 
 CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& periodic, float scale) {
     const Members members = Clouds(volume, periodic, scale).largest();
-    if (members.empty()) return {kSides[0], 1, std::vector<std::uint8_t>(std::size_t(kSides[0]) * kSides[0])};
+    if (members.empty())
+        return {kSides[0], 1, std::vector<std::uint8_t>(std::size_t(kSides[0]) * kSides[0]), 0};
     std::array<int, 3> low = members.front().place, high = low;
     for (const Member& member : members)
         for (std::size_t a = 0; a < 3; ++a) {
@@ -144,7 +146,11 @@ CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& perio
     }
     const double to_code = 255 / (double(scale) * factor * factor * factor);
     cloud.codes.reserve(sums.size());
-    for (const double sum : sums) cloud.codes.push_back(std::uint8_t(std::min(255.0, sum * to_code) + 0.5));
+    const double whole = 255 * (1 + 1e-6);  // means are rounded
+    for (const double sum : sums) {
+        cloud.cut += sum * to_code > whole;
+        cloud.codes.push_back(std::uint8_t(std::min(255.0, sum * to_code) + 0.5));
+    }
     return cloud;
 }
 
@@ -191,7 +197,7 @@ CloudVoxels read_cloud_picture(const std::filesystem::path& path) {
         if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
             throw Error(ErrorCode::io, "it is no PNG file, or is damaged");
         image.format = PNG_FORMAT_RGBA;
-        CloudVoxels cloud{int(image.height), int(image.width / std::max(1u, image.height)), {}};
+        CloudVoxels cloud{int(image.height), int(image.width / std::max(1u, image.height)), {}, 0};
         const bool known = std::ranges::find(kSides, cloud.side) != std::end(kSides);
         // PNG packs at most 1,032 bytes into one: what states more is damaged, and needs no memory.
         if (!known || image.width % image.height != 0 ||
@@ -204,12 +210,21 @@ CloudVoxels read_cloud_picture(const std::filesystem::path& path) {
         if (png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr) == 0)
             throw Error(ErrorCode::io, "it is no PNG file, or is damaged");
         const auto side = std::size_t(cloud.side), width = std::size_t(image.width);
+        std::optional<std::uint8_t> type;
         cloud.codes.resize(side * side * std::size_t(cloud.height));
         for (std::size_t k = 0; k < std::size_t(cloud.height); ++k)
             for (std::size_t j = 0; j < side; ++j)
-                for (std::size_t i = 0; i < side; ++i)
-                    cloud.codes[(k * side + j) * side + i] =
-                        pixels[((side - 1 - j) * width + k * side + i) * kChannels + 2];
+                for (std::size_t i = 0; i < side; ++i) {
+                    const std::uint8_t* pixel =
+                        pixels.data() + ((side - 1 - j) * width + k * side + i) * kChannels;
+                    const std::uint8_t code = pixel[2];
+                    cloud.codes[(k * side + j) * side + i] = code;
+                    if (code > 0) type = type.value_or(pixel[1]);
+                    if (pixel[0] != 0 || pixel[1] != (code > 0 ? *type : 0) || pixel[3] != 255)
+                        throw Error(ErrorCode::io,
+                                    "its voxels are not opaque, without red, and of one type: expected a "
+                                    "picture that nephos has written");
+                }
         return cloud;
     });
 }

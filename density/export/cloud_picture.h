@@ -21,6 +21,7 @@ namespace nephos {
 struct CloudVoxels {
     int side = 0, height = 0;
     std::vector<std::uint8_t> codes;
+    std::uint64_t cut = 0;  // voxels above the scale, which are it; 0 of a cloud that was read
 };
 
 // Returns the cloud of the greatest mass. Clouds of a sky touch where they are thin, so a cloud is what hangs together where
@@ -37,7 +38,7 @@ std::uint64_t largest_cloud_bytes(const std::array<int, 3>& size, const std::arr
 
 // Writes the picture; `type` 0..1. Throws Error(io) naming the file.
 void write_cloud_picture(const std::filesystem::path& path, const CloudVoxels& cloud, double type);
-// Reads one. Throws Error(io) naming the file when it is no such picture.
+// Reads one. Throws Error(io) naming the file when it is no such picture, of one type.
 CloudVoxels read_cloud_picture(const std::filesystem::path& path);
 
 }  // namespace nephos

@@ -51,7 +51,8 @@ struct VtiPlace {
 };
 void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, const VtiPlace& place,
                bool zip);
-EncodedVolume read_vti(const std::filesystem::path& path);
+// `place`, unless null, becomes what the file says of it.
+EncodedVolume read_vti(const std::filesystem::path& path, VtiPlace* place = nullptr);
 
 // A collection of files with their times for ParaView (.pvd); names are relative to it.
 struct PvdEntry {

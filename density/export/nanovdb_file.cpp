@@ -3,11 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <istream>
 #include <new>
-#include <sstream>
+#include <ostream>
 #include <stdexcept>
 #include <string_view>
 
@@ -32,6 +33,7 @@
 #include "core/error.h"
 #include "density/openvdb_access.h"
 #include "density/vdb/block_stream.h"
+#include "density/vdb/vdb_output.h"
 #include "density/vdb/vdb_sandbox.h"
 
 namespace nephos {
@@ -63,11 +65,10 @@ nanovdb::GridHandle<> converted(const FloatGrid& grid, NanoQuantise quantise) {
     return nanovdb::openToNanoVDB(grid);
 }
 
-// The library tells a lack of memory by words: of its buffer, and of a stream, which fails for nothing else where it is one of memory.
+// The library tells a lack of memory by words.
 bool is_of_memory(const std::exception& error) {
     const std::string_view what = error.what();
-    return dynamic_cast<const std::bad_alloc*>(&error) != nullptr || what.ends_with("malloc failed") ||
-           what.starts_with("Failed to write");
+    return dynamic_cast<const std::bad_alloc*>(&error) != nullptr || what.ends_with("malloc failed");
 }
 
 }  // namespace
@@ -77,20 +78,32 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
     openvdb::initialize();
     constexpr nanovdb::io::Codec kCodecs[] = {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP,
                                               nanovdb::io::Codec::BLOSC};
-    const auto grid = described(density);
-    // The library seeks over what precedes the voxels before there are bytes, which a string stream refuses.
-    const std::size_t head =
-        sizeof(nanovdb::io::Header) + sizeof(nanovdb::io::MetaData) + grid->getName().size() + 1;
-    std::ostringstream stream(std::string(head, '\0'), std::ios::binary);
-    try {
-        nanovdb::io::writeGrid(stream, converted(*grid, quantise), kCodecs[std::size_t(codec)]);
-    } catch (const Error&) {
-        throw;
-    } catch (const std::exception& error) {
-        if (is_of_memory(error)) throw std::bad_alloc();
-        throw Error(ErrorCode::io, path.string() + ": cannot convert to NanoVDB: " + error.what());
-    }
-    write_atomically(path, std::string_view(stream.view()));
+    const nanovdb::GridHandle<> handle = [&] {
+        try {
+            return converted(*described(density), quantise);
+        } catch (const std::exception& error) {
+            if (is_of_memory(error)) throw std::bad_alloc();
+            throw Error(ErrorCode::io, path.string() + ": cannot convert to NanoVDB: " + error.what());
+        }
+    }();
+    write_atomically(path, [&](const std::filesystem::path& temporary) {
+        VdbOutput file(temporary);
+        std::ostream stream(&file);
+        try {
+            if (file.error() == 0) nanovdb::io::writeGrid(stream, handle, kCodecs[std::size_t(codec)]);
+        } catch (const std::bad_alloc&) {
+            throw;
+        } catch (const std::exception&) {
+            file.fail(path);
+        }
+        if (!stream || !file.close()) file.fail(path);
+    });
+}
+
+std::uint64_t nanovdb_work_bytes(std::uint64_t grid_bytes, NanoCodec codec, NanoQuantise quantise) {
+    const std::uint64_t bits = quantise == NanoQuantise::none ? 32 : quantise == NanoQuantise::fp16 ? 16 : 8;
+    const std::uint64_t grid = grid_bytes / 16 + grid_bytes / 32 * bits;  // nodes and masks, and voxels
+    return codec == NanoCodec::zip ? 2 * grid : grid;
 }
 
 namespace {
@@ -151,14 +164,36 @@ bool send_grid_of(const nanovdb::GridHandle<>& handle, const CoordBBox& extent, 
     return true;
 }
 
-// In the child: the blocks of the only grid of an open file, of values as they are or quantised.
+// Size and places of voxels: a matrix, and what the centre of the first voxel is moved by.
+void send_map(SandboxWriter& writer, const nanovdb::Map& map) {
+    for (const double number : map.mMatD) writer.value(number);
+    for (const double number : map.mVecD) writer.value(number);
+}
+
+Placement receive_placement(SandboxReader& reader) {
+    std::array<double, 9> matrix{};
+    std::array<double, 3> centre{};
+    for (double& number : matrix) number = reader.value<double>();
+    for (double& number : centre) number = reader.value<double>();
+    const double size = matrix[0];
+    const std::array<double, 9> uniform{size, 0, 0, 0, size, 0, 0, 0, size};
+    const bool is_finite = std::ranges::all_of(centre, [](double at) { return std::isfinite(at); });
+    if (matrix != uniform || !(size > 0) || !std::isfinite(size) || !is_finite)
+        throw std::runtime_error("its voxels are no cubes along the axes");
+    return {{centre[0] - size / 2, centre[1] - size / 2, centre[2] - size / 2}, size};
+}
+
+// In the child: place and blocks of the only grid of an open file, of values as they are or quantised.
 void send_grid(int file, const Extent& extent, SandboxWriter& writer) {
     __gnu_cxx::stdio_filebuf<char> buffer(file, std::ios::in | std::ios::binary);
     std::istream stream(&buffer);
     stream.exceptions(std::ios::badbit);  // with the system's error
     const auto handles = nanovdb::io::readGrids(stream);
     const CoordBBox box(openvdb::Coord(0), openvdb::Coord(extent.x - 1, extent.y - 1, extent.z - 1));
-    if (handles.size() == 1) require_one_grid(handles.front());
+    if (handles.size() == 1) {
+        require_one_grid(handles.front());
+        send_map(writer, handles.front().gridMetaData()->map());
+    }
     const auto is_sent = [&](const nanovdb::GridHandle<>& handle) {
         return send_grid_of<float>(handle, box, writer) || send_grid_of<nanovdb::Fp8>(handle, box, writer) ||
                send_grid_of<nanovdb::Fp16>(handle, box, writer);
@@ -170,7 +205,7 @@ void send_grid(int file, const Extent& extent, SandboxWriter& writer) {
 
 }  // namespace
 
-DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const Placement& placement) {
+DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent) {
     openvdb::initialize();  // before the fork, so that the child finds it done
     const Descriptor file = open_regular_file(path, O_RDONLY);
     constexpr double kSeconds = 120;
@@ -195,7 +230,10 @@ DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const
                                          error.what());
             }
         },
-        [&](SandboxReader& reader) { density = receive_blocks(reader, extent, placement); });
+        [&](SandboxReader& reader) {
+            const Placement placement = receive_placement(reader);
+            density = receive_blocks(reader, extent, placement);
+        });
     return density;
 }
 

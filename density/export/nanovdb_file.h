@@ -4,6 +4,7 @@
 // NanoVDB files, which renderers on graphics cards read: one float grid `density` with the transform of our VDB files.
 // NanoVDB has no metadata: what else is known of the grid is in the sidecar of an export.
 
+#include <cstdint>
 #include <filesystem>
 
 #include "density/density_grid.h"
@@ -20,8 +21,11 @@ constexpr int largest_code(NanoQuantise quantise) { return quantise == NanoQuant
 void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
                    NanoQuantise quantise);
 
-// Reads the float grid of a file, quantised or not, as a grid of this extent and placement. A confined child process
+// Returns about the memory that write_nanovdb() takes beside a grid of `grid_bytes`: the library's own, and its compressed bytes.
+std::uint64_t nanovdb_work_bytes(std::uint64_t grid_bytes, NanoCodec codec, NanoQuantise quantise);
+
+// Reads the float grid of a file, quantised or not, as a grid of this extent where the file places it. A confined child process
 // parses it (density/vdb/sandbox.h). Throws Error(io) naming the file, also when it has voxels outside of the extent.
-DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const Placement& placement);
+DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent);
 
 }  // namespace nephos

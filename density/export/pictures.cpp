@@ -6,6 +6,7 @@
 #include <cmath>
 #include <csetjmp>
 #include <cstring>
+#include <new>
 #include <string_view>
 
 #include <png.h>
@@ -51,9 +52,11 @@ std::vector<std::byte> zipped(const std::vector<std::byte>& bytes) {
     for (std::size_t n = 0; n < count; ++n) {
         const std::size_t size = std::min(kZipBlock, bytes.size() - n * kZipBlock);
         uLongf length = uLongf(out.size());
-        if (compress2(reinterpret_cast<Bytef*>(out.data()), &length,
-                      reinterpret_cast<const Bytef*>(bytes.data() + n * kZipBlock), uLong(size), 1) != Z_OK)
-            throw Error(ErrorCode::io, "zlib cannot compress");
+        const int status =
+            compress2(reinterpret_cast<Bytef*>(out.data()), &length,
+                      reinterpret_cast<const Bytef*>(bytes.data() + n * kZipBlock), uLong(size), 1);
+        if (status == Z_MEM_ERROR) throw std::bad_alloc();
+        if (status != Z_OK) throw Error(ErrorCode::io, "zlib cannot compress");
         table.put(std::uint64_t(length));
         blocks.put_bytes(std::span(out).first(length));
     }
@@ -105,6 +108,29 @@ std::string_view attribute(std::string_view xml, std::string_view name) {
     return xml.substr(begin, xml.find('"', begin) - begin);
 }
 
+// Throws Error(io) unless a text is so many numbers.
+template <std::size_t Count>
+std::array<double, Count> numbers_of(std::string_view text) {
+    std::array<double, Count> numbers{};
+    const char *at = text.data(), *end = at + text.size();
+    for (double& number : numbers) {
+        while (at < end && *at == ' ') ++at;
+        const auto [after, error] = std::from_chars(at, end, number);
+        if (error != std::errc()) throw Error(ErrorCode::io, "a number is missing in its head");
+        at = after;
+    }
+    return numbers;
+}
+
+VtiPlace place_of(std::string_view xml) {
+    constexpr std::string_view kTime = "Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">";
+    const std::size_t time = xml.find(kTime);
+    if (time == xml.npos) throw Error(ErrorCode::io, "its time is missing");
+    const std::string_view rest = xml.substr(time + kTime.size());
+    return {numbers_of<3>(attribute(xml, "Origin")), numbers_of<3>(attribute(xml, "Spacing")),
+            numbers_of<1>(rest.substr(0, rest.find('<')))[0]};
+}
+
 }  // namespace
 
 void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, const VtiPlace& place,
@@ -139,7 +165,7 @@ void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, c
     });
 }
 
-EncodedVolume read_vti(const std::filesystem::path& path) {
+EncodedVolume read_vti(const std::filesystem::path& path, VtiPlace* place) {
     return with_whole_file(path, [&](ByteReader& reader) {
         const std::span<const std::byte> all = reader.rest();
         const std::string_view text(reinterpret_cast<const char*>(all.data()), all.size());
@@ -162,6 +188,7 @@ EncodedVolume read_vti(const std::filesystem::path& path) {
         const std::string_view type = attribute(xml.substr(points), "type");
         for (const VoxelType one : {VoxelType::r8, VoxelType::r16, VoxelType::r32f})
             if (vtk_type(one) == type) volume.type = one;
+        if (place != nullptr) *place = place_of(xml);
         VolumeLevel level{bounds[1] + 1, bounds[3] + 1, bounds[5] + 1, {}};
         reader.skip(mark + kMark.size());
         if (xml.find("vtkZLibDataCompressor") != xml.npos) {

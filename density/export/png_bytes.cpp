@@ -3,6 +3,8 @@
 
 #include <bit>
 #include <csetjmp>
+#include <cstring>
+#include <exception>
 #include <utility>
 #include <vector>
 
@@ -20,10 +22,25 @@ struct Writing {
     const std::function<void(std::uint32_t y, std::span<std::byte> row)>& fill;
     std::string bytes;
     std::vector<std::byte> row;
+    char reason[128] = "";  // why libpng gave up
 };
 
+[[noreturn]] void on_error(png_structp png, png_const_charp message) {
+    auto& writing = *static_cast<Writing*>(png_get_error_ptr(png));
+    std::strncpy(writing.reason, message, sizeof writing.reason - 1);
+    png_longjmp(png, 1);
+}
+
+void on_warning(png_structp, png_const_charp) {}
+
 void append(png_structp png, png_bytep data, png_size_t size) {
-    static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(data), size);
+    bool stored = true;
+    try {
+        static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(data), size);
+    } catch (const std::exception&) {
+        stored = false;
+    }
+    if (!stored) png_error(png, "out of memory");
 }
 
 void write_rows(png_structp png, png_infop info, Writing& writing) {
@@ -47,7 +64,7 @@ void write_rows(png_structp png, png_infop info, Writing& writing) {
 
 // Returns false when libpng cannot encode it.
 bool encode(Writing& writing) {
-    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &writing, on_error, on_warning);
     png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
     if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {  // NOLINT: libpng reports by longjmp
         png_destroy_write_struct(&png, &info);
@@ -63,11 +80,11 @@ bool encode(Writing& writing) {
 std::string png_bytes(const std::filesystem::path& path, const PngShape& shape,
                       const std::function<void(std::uint32_t y, std::span<std::byte> row)>& fill) {
     const std::size_t pixel = std::size_t(shape.channels) * std::size_t(shape.bits / 8);
-    Writing writing{shape, fill, {}, std::vector<std::byte>(std::size_t(shape.width) * pixel)};
+    Writing writing{shape, fill, {}, std::vector<std::byte>(std::size_t(shape.width) * pixel), {}};
     if (encode(writing)) return std::move(writing.bytes);
     throw Error(ErrorCode::io, path.string() + ": libpng cannot encode a picture of " +
                                    std::to_string(shape.width) + " x " + std::to_string(shape.height) +
-                                   " pixels");
+                                   " pixels" + (*writing.reason != '\0' ? ": " : "") + writing.reason);
 }
 
 }  // namespace nephos

@@ -63,6 +63,13 @@ VolumeBox box_of(Extent extent, const Placement& placement, const VolumeLayout& 
     return box;
 }
 
+std::array<bool, 3> repeating_axes(const VolumeBox& box, const VolumeLayout& layout) {
+    std::array<bool, 3> repeat{};
+    for (std::size_t a = 0; a < 3; ++a)
+        repeat[a] = layout.periodic[std::size_t(box.axis[a])] && box.border == 0 && box.padding[a] == 0;
+    return repeat;
+}
+
 Volume lay_out(const DensityGrid& density, const VolumeLayout& layout) {
     const VolumeBox box = box_of(density.extent(), density.placement(), layout);
     Volume volume{box.size[0], box.size[1], box.size[2], {}};

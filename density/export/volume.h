@@ -66,6 +66,9 @@ struct VolumeBox {
 
 VolumeBox box_of(Extent extent, const Placement& placement, const VolumeLayout& layout);
 
+// Returns which of the file's axes repeat in the box: those of which nothing stands between its sides.
+std::array<bool, 3> repeating_axes(const VolumeBox& box, const VolumeLayout& layout);
+
 // Returns the memory that lay_out() takes for a box of so many voxels: a float for each, and a sum where there are several cells
 // in one.
 constexpr std::uint64_t layout_bytes(std::uint64_t voxels, int factor) {

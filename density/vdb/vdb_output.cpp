@@ -2,9 +2,12 @@
 #include "density/vdb/vdb_output.h"
 
 #include <cerrno>
+#include <cstring>
 
 #include <fcntl.h>
 #include <unistd.h>
+
+#include "core/error.h"
 
 namespace nephos {
 
@@ -20,6 +23,11 @@ bool VdbOutput::close() {
     const bool closed = file_.close() == 0;
     if (!closed && error_ == 0) error_ = errno;
     return written && closed;
+}
+
+void VdbOutput::fail(const std::filesystem::path& path) const {
+    throw Error(ErrorCode::io,
+                path.string() + ": cannot write: " + (error_ != 0 ? std::strerror(error_) : "unknown error"));
 }
 
 bool VdbOutput::write_gathered() {
@@ -46,7 +54,7 @@ VdbOutput::int_type VdbOutput::overflow(int_type character) {
 
 int VdbOutput::sync() { return write_gathered() ? 0 : -1; }
 
-// OpenVDB goes back to what it has written, never beyond, and asks where it is.
+// OpenVDB goes back to what it has written, and asks where it is; NanoVDB leaves room for its header, and goes back to it.
 VdbOutput::pos_type VdbOutput::seekoff(off_type offset, std::ios_base::seekdir from,
                                        std::ios_base::openmode which) {
     const auto here = off_type(begin_) + (pptr() - pbase());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The file that a VDB is written to (not installed). OpenVDB asks its stream for the position with tellp(), and
+// The file that a VDB or NanoVDB is written to (not installed). OpenVDB asks its stream for the position with tellp(), and
 // std::filebuf answers a failed lseek(2) with -1 that nobody checks: offsets of grids are then wrong in a file that
 // seems to be complete. This buffer counts the position itself and writes with pwrite(2), so that there is no seeking
 // that could fail; and it opens no link that was put in the place of the file.
@@ -24,6 +24,8 @@ class VdbOutput : public std::streambuf {
     bool close();
     // Returns errno of the first operation that failed; 0 = none.
     int error() const { return error_; }
+    // Throws Error(io) with what failed; `path`: the file as the user knows it.
+    [[noreturn]] void fail(const std::filesystem::path& path) const;
 
   protected:
     int_type overflow(int_type character) override;

@@ -303,24 +303,19 @@ constexpr std::streamoff kUuidOffset = 8 + 3 * 4 + 1;
 void write_file(const std::filesystem::path& temporary, const std::filesystem::path& path,
                 const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) {
     VdbOutput file(temporary);
-    const auto check = [&](bool good) {
-        if (good) return;
-        throw Error(ErrorCode::io, path.string() + ": cannot write: " +
-                                       (file.error() != 0 ? std::strerror(file.error()) : "unknown error"));
-    };
-    check(file.error() == 0);
+    if (file.error() != 0) file.fail(path);
     try {
         std::ostream stream(&file);
         stream.exceptions(std::ios::badbit | std::ios::failbit);
         CheckedArchive().save(stream, grids, metadata);
         stream.seekp(kUuidOffset);
         stream << uuid_of(path, grids, metadata);
-        check(file.close());
     } catch (const std::ios_base::failure&) {
-        check(false);
+        file.fail(path);
     } catch (const openvdb::Exception& error) {
         throw Error(ErrorCode::io, path.string() + ": cannot write: " + error.what());
     }
+    if (!file.close()) file.fail(path);
 }
 
 // Limits a grid of the wind to 2^24 voxels.

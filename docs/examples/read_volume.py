@@ -11,6 +11,8 @@ path = pathlib.Path(sys.argv[1])
 sidecar = json.loads(path.read_text())
 number = int(sys.argv[2]) if len(sys.argv) > 2 else sidecar["first"]
 raw = next(f for f in sidecar["formats"] if f["format"] == "raw")
+if raw["type"] == "bc4":
+    sys.exit(f"{path}: blocks of bc4 are for graphics cards: export with --type r8, r16, r16f or r32f to read voxels")
 dtype, full = {"r8": ("u1", 255), "r16": ("<u2", 65535), "r16f": ("<f2", 1), "r32f": ("<f4", 1)}[raw["type"]]
 nx, ny, nz = raw["levels"][0]["size"]
 codes = numpy.fromfile(path.parent / (raw["files"] % number), dtype, nx * ny * nz).reshape(nz, ny, nx)

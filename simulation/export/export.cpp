@@ -287,10 +287,10 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
         for (ExportedFrame::File& file : frame.files)
             file.kept ? list.add_kept(std::move(file.listed)) : list.add_written(std::move(file.listed));
         if (frame.figures.max > s.scale && cuts_values(options))
-            notes.push_back(
-                fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
-                            "(--range auto keeps them)",
-                            s.frames[of.size()].file.string(), frame.figures.max, s.scale));
+            notes.push_back(fmt::format(
+                "{}: values up to {:g} are above {:g}, and are cut in r8, r16, bc4 and flightgear "
+                "(--range auto keeps them)",
+                s.frames[of.size()].file.string(), frame.figures.max, s.scale));
         of.push_back(frame.figures);
         ++done;
     };

@@ -46,19 +46,39 @@ std::uint64_t leaf_voxels(const std::array<int, 3>& size) {
     return voxels;
 }
 
-// The library's own grid, which has all leaves as floats first, and the file, which grows in memory to twice its size.
-std::uint64_t nanovdb_bytes(const ExportSequence& s) {
-    const std::uint64_t grid =
-        s.layout.factor > 1 ? sizeof(float) * leaf_voxels(cells_of(s).size) : std::uint64_t(s.grid_bytes);
-    return 3 * grid;
+NanoCodec codec_of(const ExportOptions& options) { return options.zip ? NanoCodec::zip : NanoCodec::none; }
+
+// Returns what NanoVDB takes beside a grid of so many bytes.
+std::uint64_t nanovdb_bytes(const ExportOptions& options, std::uint64_t grid_bytes) {
+    return nanovdb_work_bytes(grid_bytes, codec_of(options), options.quantise);
 }
 
-// Voxels of the leaves of a grid of the wind: all, or, of a wind that is one everywhere, those that reach out of the box.
-double wind_voxels(const ExportSequence& s) {
-    const std::array<int, 3> size = cells_of(s).size;
-    double inner = s.wind_fields.empty() && s.metadata.wind.size() <= 1 ? 1 : 0;
-    for (const int side : size) inner *= side / kLeafEdge * kLeafEdge;
-    return double(leaf_voxels(size)) - inner;
+// Returns the leaves of the grid of larger voxels; none where its voxels are those of the source.
+std::uint64_t coarser_grid_bytes(const ExportSequence& s) {
+    return s.layout.factor > 1 ? sizeof(float) * leaf_voxels(cells_of(s).size) : 0;
+}
+
+// Returns what coarser() takes on the way to it: the box, and beside that its sums, and then the grid.
+std::uint64_t coarsening_bytes(const ExportSequence& s) {
+    if (s.layout.factor == 1) return 0;
+    const std::uint64_t voxels = cells_of(s).voxels();
+    return std::max(layout_bytes(voxels, s.layout.factor), sizeof(float) * voxels + coarser_grid_bytes(s));
+}
+
+// The wind in voxels of velocity_voxel(): its leaves, all of them, or, of a wind that is one everywhere, those that reach out of the box,
+// and the nodes above them.
+std::uint64_t wind_bytes(const ExportSequence& s) {
+    constexpr int kNodeEdge = 128;
+    constexpr double kNodeBytes = 66'000;
+    std::array<int, 3> size = cells_of(s).size;
+    const int edge = velocity_voxel({size[0], size[1], size[2]});
+    double inner = s.wind_fields.empty() && s.metadata.wind.size() <= 1 ? 1 : 0, nodes = 1;
+    for (int& side : size) {
+        side = (side + edge - 1) / edge;
+        inner *= side / kLeafEdge * kLeafEdge;
+        nodes *= (side + kNodeEdge - 1) / kNodeEdge;
+    }
+    return std::uint64_t(velocity_bytes(double(leaf_voxels(size)) - inner) + kNodeBytes * nodes);
 }
 
 std::uint64_t cloud_bytes(const ExportSequence& s, std::uint64_t positive) {
@@ -123,20 +143,13 @@ double billows_of(const std::string& genus) {
     return 0.8;
 }
 
-// Bricks wrap around where the box repeats and nothing stands between its sides.
-BrickOptions brick_options(const ExportOptions& options, const ExportSequence& s, VoxelType type) {
-    const VolumeBox box = box_of(s.extent, s.placement, s.layout);
-    BrickOptions bricks{options.brick_edge, type, s.scale, {}};
-    for (std::size_t a = 0; a < 3; ++a)
-        bricks.periodic[a] =
-            s.layout.periodic[std::size_t(box.axis[a])] && box.border == 0 && box.padding[a] == 0;
-    return bricks;
-}
-
-// Throws Error(usage) where a value is beyond 16-bit floats, in which it would be infinite.
+// Throws Error(usage) where a value, or the mean of several, is beyond 16-bit floats, in which it would be infinite.
 void require_halves(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
-                    float largest) {
+                    const DensityGrid& density) {
     constexpr float kLargestHalf = 65504;
+    float largest = density.max_value();
+    const bool may_be_beyond = largest > kLargestHalf * std::min(1.0f, s.scale);
+    if (may_be_beyond && s.layout.factor > 1) largest = coarser(density, s.layout.factor).max_value();
     for (const ExportFormat format : all_formats(options)) {
         const bool is_vdb = format == ExportFormat::vdb;
         const bool halves = is_vdb ? options.type == VoxelType::r16f
@@ -144,9 +157,10 @@ void require_halves(const ExportOptions& options, const ExportSequence& s, const
         if (!halves || !(largest > kLargestHalf * (is_vdb ? 1 : s.scale))) continue;
         throw Error(
             ErrorCode::usage,
-            fmt::format("{}: its largest value is {:g}, and 16-bit floats end at {:g}: expected --type "
+            fmt::format("{}: its largest value{} is {:g}, and 16-bit floats end at {:g}: expected --type "
                         "r32f{}",
-                        frame.file.string(), largest, kLargestHalf, is_vdb ? "" : " or --range auto"));
+                        frame.file.string(), s.layout.factor > 1 ? ", or mean," : "", largest, kLargestHalf,
+                        is_vdb ? "" : " or --range auto"));
     }
 }
 
@@ -193,7 +207,7 @@ ExportedFrame FrameExporter::write_files(const ExportSequence& s, const SourceFr
     if (!(loaded.density.extent() == s.extent) || !(loaded.density.placement() == s.placement))
         throw Error(ErrorCode::io,
                     frame.file.string() + ": has another box than the first file of its sequence");
-    require_halves(options_, s, frame, loaded.density.max_value());
+    require_halves(options_, s, frame, loaded.density);
     require_codes(options_, s, frame, loaded.density);
     const ExportSource source{frame.file, file_digest(frame.file)};
     require_unchanged(frame);
@@ -254,13 +268,16 @@ bool FrameExporter::write_format(const std::filesystem::path& path, ExportFormat
     }
     if (format == ExportFormat::nvdb) {
         const DensityGrid density = coarser(loaded.density, s.layout.factor);
-        write_nanovdb(path, density, options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
+        require_memory(std::size_t(nanovdb_bytes(options_, density.memory_bytes())),
+                       frame.file.string() + ": as NanoVDB");
+        write_nanovdb(path, density, codec_of(options_), options_.quantise);
         return density.max_value() <= 0;  // means of the least of floats
     }
     if (made.levels.empty()) made.levels = levels_of(loaded.density, s);
     const bool lost = is_lost(type, std::ranges::max(made.levels.front().values), s.scale);
     if (format == ExportFormat::bricks) {
-        write_bricks(path, made.levels, brick_options(options_, s, type));
+        const VolumeBox box = box_of(s.extent, s.placement, s.layout);
+        write_bricks(path, made.levels, {options_.brick_edge, type, s.scale, repeating_axes(box, s.layout)});
         return lost;
     }
     auto found = made.encoded.find(type);
@@ -304,11 +321,12 @@ std::uint64_t box_bytes(const ExportOptions& options, const ExportSequence& s) {
         const bool is_grid = format == ExportFormat::vdb || format == ExportFormat::nvdb;
         std::uint64_t of_file = 0;
         if (format == ExportFormat::flightgear) of_file = cloud_bytes(s, 0);
-        if (is_grid && s.layout.factor > 1) of_file = layout_bytes(cells_of(s).voxels(), s.layout.factor);
-        if (format == ExportFormat::nvdb) of_file += nanovdb_bytes(s);
+        if (is_grid) of_file = coarser_grid_bytes(s);
+        if (format == ExportFormat::nvdb)
+            of_file += nanovdb_bytes(options, of_file > 0 ? of_file : s.grid_bytes);
         if (format == ExportFormat::bricks) of_file = brick_work_bytes(sizes, options.brick_edge, type);
-        if (format == ExportFormat::vdb && has_velocity(options, s))
-            of_file += std::uint64_t(velocity_bytes(wind_voxels(s)));
+        if (format == ExportFormat::vdb && has_velocity(options, s)) of_file += wind_bytes(s);
+        if (is_grid) of_file = std::max(of_file, coarsening_bytes(s));
         if (is_packed(options, format)) of_file = dense_bytes(options, s, format);
         passing = std::max(passing, of_file);
         has_boxes = has_boxes || is_dense(format);
@@ -327,7 +345,9 @@ std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& s
         std::min<std::uint64_t>(std::uint64_t(256) << 20, available_memory().bytes / 2);
     const std::size_t threads =
         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-    if (threads <= 1) return 1;
+    // The heap of each thread reserves addresses, which a limit counts.
+    constexpr std::size_t kFewAddresses = std::size_t(256) << 20;
+    if (threads <= 1 || available_memory().bytes < kFewAddresses) return 1;
     const std::uint64_t voxels = leaf_voxels({s.extent.x, s.extent.y, s.extent.z});
     return std::size_t(
         std::clamp<std::uint64_t>(memory / (8 * voxels + box_bytes(options, s)), 1, threads + 1));

@@ -165,7 +165,8 @@ int factor_near(const ExportSequence& s, int factor, int step) {
         if (s.layout.periodic[a])
             period += fmt::format("{}{} voxels along {}", period.empty() ? "" : " and ", sides[a], "xyz"[a]);
     const double edge = s.placement.cell_size_m;
-    const int below = factor_near(s, factor, -1), above = factor_near(s, factor, 1);
+    const int below = factor_near(s, std::min(factor, std::ranges::max(sides)), -1),
+              above = factor_near(s, factor, 1);
     std::string cure;
     for (const int f : {below, above})
         if (f > 1) cure += (cure.empty() ? "--voxel " : " or --voxel ") + number_text(f * edge, 9);
@@ -199,12 +200,9 @@ int factor_of(const ExportOptions& options, const ExportSequence& s) {
     const int longest = std::ranges::max(sides_of(s));
     const int least = std::max(1, (longest + *options.largest_side - 1) / *options.largest_side);
     const int factor = factor_near(s, least, 1);
-    if (factor > 0) return factor;
-    const int coarsest = factor_near(s, longest, -1);
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("--size {}: the longest side of {} has at least {} voxels: whole tiles have to fit",
-                    *options.largest_side, s.name, (longest + coarsest - 1) / coarsest));
+    return factor > 0
+               ? factor
+               : factor_near(s, longest, -1);  // the coarsest: too long a side, as choose_layout() finds
 }
 
 // Sizes, levels and padding of one sequence.
@@ -243,19 +241,27 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
         }
         return true;
     };
-    const auto longest_side = [&] { return std::ranges::max(box_of(s.extent, s.placement, s.layout).size); };
+    const auto longest_side = [&] {
+        const VolumeLayout of_grid{.factor = s.layout.factor};
+        return std::ranges::max(box_of(s.extent, s.placement, dense ? s.layout : of_grid).size);
+    };
     int least = std::numeric_limits<int>::max();
     const auto has_size = [&] {
         least = std::min(least, longest_side());
         return least <= *options.largest_side;
     };
-    if (options.largest_side && dense && !coarsen_until(has_size))
-        throw Error(
-            ErrorCode::usage,
-            fmt::format("--size {}: the longest side of {} has at least {} voxels: {}{}those of a border "
-                        "and of --pad count",
-                        *options.largest_side, s.name, least, blocks ? "those of BC4 come in fours, " : "",
-                        keeps_period(s, longest) ? "" : "whole tiles have to fit, "));
+    if (options.largest_side && !coarsen_until(has_size)) {
+        std::string why;
+        const auto add = [&](bool is_so, std::string_view reason) {
+            if (is_so) why += (why.empty() ? ": " : ", ") + std::string(reason);
+        };
+        add(blocks, "those of BC4 come in fours");
+        add(!keeps_period(s, longest), "whole tiles have to fit");
+        add(dense, "those of a border and of --pad count");
+        throw Error(ErrorCode::usage,
+                    fmt::format("--size {}: the longest side of {} has at least {} voxels{}",
+                                *options.largest_side, s.name, least, why));
+    }
     const auto frame_bytes = [&] {
         std::uint64_t bytes = 0;
         for (const ExportFormat format : formats)

@@ -67,14 +67,21 @@ void compare(const std::filesystem::path& path, const std::vector<float>& expect
     d.voxels += expected.size();
 }
 
+// The least and the largest value of a block of a grid, which beyond the box has zeros.
+struct Range {
+    double least = 0, largest = 0;
+};
+
 // Grids of the same extent, without room for the voxels between their clouds. `allowed` gives what a voxel of a value may differ by
-// in a block with a largest one.
+// in a block of a range.
 template <typename Allowed>
 void compare(const DensityGrid& expected, const DensityGrid& found, const Allowed& allowed, Difference& d) {
+    constexpr std::size_t kWholeBlock = 512;
     expected.visit_blocks(found, [&](std::span<const float> a, std::span<const float> b) {
-        const double largest = double(std::ranges::max(a));
+        const auto [least, largest] = std::ranges::minmax(a);
+        const Range range{a.size() == kWholeBlock ? double(least) : 0, double(largest)};
         for (std::size_t n = 0; n < a.size(); ++n)
-            add(double(a[n]), double(b[n]), allowed(double(a[n]), largest), d);
+            add(double(a[n]), double(b[n]), allowed(double(a[n]), range), d);
     });
     d.voxels += expected.extent().cells();
 }
@@ -132,6 +139,30 @@ std::uint64_t size_of_file(const std::filesystem::path& path) {
     return error ? 0 : bytes;  // reading it tells
 }
 
+constexpr const char* kElsewhere = "lies at another place than its source";
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+// Returns whether a grid lies where it should, but for the rounding of the centre of its first voxel, which is what files hold.
+bool is_at(const Placement& found, const Placement& expected) {
+    const double size = expected.cell_size_m;
+    if (!(std::abs(found.cell_size_m - size) <= 8 * kEpsilon * size)) return false;
+    for (int a = 0; a < 3; ++a) {
+        const double most = 8 * kEpsilon * (std::abs(expected.origin_m[a]) + size);
+        if (!(std::abs(found.origin_m[a] - expected.origin_m[a]) <= most)) return false;
+    }
+    return true;
+}
+
+bool is_at(const VtiPlace& found, const VolumeBox& box) {
+    for (std::size_t a = 0; a < 3; ++a) {
+        const double size = box.voxel_m[a], first_m = box.min_m[a] + size / 2;
+        if (!(std::abs(found.voxel_m[a] - size) <= 8 * kEpsilon * size)) return false;
+        if (!(std::abs(found.first_m[a] - first_m) <= 8 * kEpsilon * (std::abs(first_m) + size)))
+            return false;
+    }
+    return true;
+}
+
 EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
                          const VolumeBox& box, int levels) {
     const auto& [nx, ny, nz] = box.size;
@@ -147,29 +178,23 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
     if (format == "raw") return read_raw(path, type, nx, ny, nz, levels);
     if (format == "dds") return read_dds(path);
     if (format == "ktx2") return read_ktx2(path);
-    if (format == "vti") return read_vti(path);
+    if (format == "vti") {
+        VtiPlace place;
+        EncodedVolume volume = read_vti(path, &place);
+        if (!is_at(place, box)) bad_file(path, kElsewhere);
+        return volume;
+    }
     return read_slices(path, nx, ny, nz, slice_columns(nx, ny, nz));
 }
 
 // Returns half a step of the codes of a leaf, a block of the grid, which go from its least to its greatest value; or all that is
 // between them where the library finds infinity for its codes a unit.
-double allowed_error(NanoQuantise quantise, double value, double largest) {
+double allowed_error(NanoQuantise quantise, double value, const Range& of_block) {
     if (quantise == NanoQuantise::none) return kRoundings * value + kSmallest;
-    const double codes = largest_code(quantise);
-    const double least = codes / double(std::numeric_limits<float>::max());
-    return largest * 1.001 / codes / 2 + kRoundings * largest + 1.001 * std::min(largest, least) + kSmallest;
-}
-
-// Returns whether a grid lies where it should, but for the rounding of the centre of its first voxel, which is what files hold.
-bool is_at(const Placement& found, const Placement& expected) {
-    constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-    const double size = expected.cell_size_m;
-    if (!(std::abs(found.cell_size_m - size) <= 8 * kEpsilon * size)) return false;
-    for (int a = 0; a < 3; ++a) {
-        const double most = 8 * kEpsilon * (std::abs(expected.origin_m[a]) + size);
-        if (!(std::abs(found.origin_m[a] - expected.origin_m[a]) <= most)) return false;
-    }
-    return true;
+    const double codes = largest_code(quantise), range = of_block.largest - of_block.least;
+    const double lost = codes / double(std::numeric_limits<float>::max());
+    return range * 1.005 / codes / 2 + kRoundings * of_block.largest + 1.001 * std::min(range, lost) +
+           kSmallest;
 }
 
 // Adds the differences of one file to its source. Returns false for what cannot be compared.
@@ -187,9 +212,11 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         const DensityGrid expected = coarser(source, s.layout.factor);
         Placement at = expected.placement();
         if (file.format == "nvdb") {
+            const DensityGrid found = read_nanovdb(path, expected.extent());
+            if (!is_at(found.placement(), at)) bad_file(path, kElsewhere);
             compare(
-                expected, read_nanovdb(path, expected.extent(), at),
-                [&](double value, double largest) { return allowed_error(list.quantise, value, largest); },
+                expected, found,
+                [&](double value, const Range& range) { return allowed_error(list.quantise, value, range); },
                 d);
             return true;
         }
@@ -199,12 +226,12 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         const DensityGrid& found = loaded.density;
         if (list.half_voxel_shift)
             for (int a = 0; a < 3; ++a) at.origin_m[a] -= at.cell_size_m / 2;
-        if (!is_at(found.placement(), at)) bad_file(path, "lies at another place than its source");
+        if (!is_at(found.placement(), at)) bad_file(path, kElsewhere);
         const auto type = list.types.find(file.format);
         if (!(found.extent() == expected.extent())) bad_file(path, "has another size than its source");
         const Tolerance t = tolerance_of(type == list.types.end() ? VoxelType::r32f : type->second, 1);
         compare(
-            expected, found, [&](double value, double) { return t.of(value); }, d);
+            expected, found, [&](double value, const Range&) { return t.of(value); }, d);
         return true;
     }
     if (file.format == "flightgear") {
@@ -218,6 +245,7 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         compare(
             path, {expected.codes.begin(), expected.codes.end()}, {found.codes.begin(), found.codes.end()},
             [](std::size_t) { return 0.0; }, d);
+        d.cut += expected.cut;
         return true;
     }
     const auto type = list.types.find(file.format);
@@ -234,10 +262,16 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     const bool one_level = file.format == "vti" || file.format == "slices";
     if (encoded.levels.size() != std::size_t(one_level ? 1 : s.levels))
         bad_file(path, "has another number of levels than the list says");
-    // Voxels of the source, and afterwards beside them those of the codes.
+    const bool has_bricks = file.format == "bricks";
+    // Voxels of the source, and afterwards beside them those of the codes; of bricks all levels, and the file once more.
+    const std::uint64_t of_bricks =
+        has_bricks ? size_of_file(path) + encoded_bytes(level_sizes(box.size, s.levels), VoxelType::r32f) : 0;
     require_room(
-        path, std::max(2 * sizeof(float) * box.voxels(), layout_bytes(box.voxels(), s.layout.factor)), box);
+        path,
+        of_bricks + std::max(2 * sizeof(float) * box.voxels(), layout_bytes(box.voxels(), s.layout.factor)),
+        box);
     Volume expected = lay_out(source, s.layout);
+    std::vector<Volume> levels;  // of bricks, which have borders beside their levels
     const bool whole = encoded.type == VoxelType::r16f || encoded.type == VoxelType::r32f;
     const float most = whole ? std::max(s.scale, source.max_value()) : s.scale;
     const Tolerance tolerance = tolerance_of(encoded.type, double(s.scale));
@@ -252,7 +286,11 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
             compare(
                 path, expected.values, found,
                 [&](std::size_t n) { return tolerance.of(double(expected.values[n])); }, d, most);
+        if (has_bricks) levels.push_back(expected);
     }
+    if (has_bricks && d.too_far == 0)
+        check_bricks(path, levels, {list.brick_edge, encoded.type, s.scale, repeating_axes(box, s.layout)},
+                     most, [&](float value) { return tolerance.of(double(value)); });
     return true;
 }
 
@@ -341,8 +379,6 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
             ErrorCode::usage,
             folder.string() + ": is an export; --against, --replay, --seam and --max-change are for runs");
     Verification result{"export", {check_list(folder / "export.json")}};
-    if (!list.complete)
-        result.checks.push_back({"complete", false, "the export was interrupted: the same command goes on"});
     std::vector<ListedFile> files;
     std::set<std::filesystem::path> names{"export.json"};
     for (const ExportedFile& file : list.files) {
@@ -355,6 +391,10 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
             for (const ExportedFile& file : noted_files(folder)) names.insert(file.path);
         } catch (const Error&) {  // another user's; what they name is then told as listed nowhere
         }
+        const bool is_empty = names.size() == 2;  // but for the list and the hidden folder
+        result.checks.push_back({"complete", false,
+                                 is_empty ? "the export has made nothing yet: it was refused or interrupted"
+                                          : "the export was interrupted: the same command goes on"});
     }
     std::vector<std::filesystem::path> extra;
     for (const std::string& name : names_in_folder(folder))

@@ -280,6 +280,11 @@ TEST(Containers, AreReadBackAndRefuseWhatIsCut) {
             write_vti(folder / "v.vti", volume, {{1, 2, 3}, {25, 25, 25}, 7}, zip);
             const auto vti = [&] { return read_vti(folder / "v.vti"); };
             expect_same(vti(), 1);
+            VtiPlace place;
+            read_vti(folder / "v.vti", &place);
+            EXPECT_EQ(place.first_m, (std::array<double, 3>{1, 2, 3}));
+            EXPECT_EQ(place.voxel_m, (std::array<double, 3>{25, 25, 25}));
+            EXPECT_EQ(place.time_s, 7);
             std::filesystem::resize_file(folder / "v.vti", std::filesystem::file_size(folder / "v.vti") / 2);
             EXPECT_THROW(vti(), Error);
         }
@@ -297,15 +302,16 @@ TEST(Containers, NanoVdbHoldsTheSameVoxels) {
     const DensityGrid grid = random_grid({37, 22, 19}, 5);
     for (const NanoCodec codec : {NanoCodec::none, NanoCodec::zip, NanoCodec::blosc}) {
         write_nanovdb(folder / "v.nvdb", grid, codec, NanoQuantise::none);
-        EXPECT_TRUE(read_nanovdb(folder / "v.nvdb", grid.extent(), grid.placement()).to_dense() ==
-                    grid.to_dense());
+        EXPECT_TRUE(read_nanovdb(folder / "v.nvdb", grid.extent()).to_dense() == grid.to_dense());
     }
-    EXPECT_THROW(read_nanovdb(folder / "v.nvdb", {8, 8, 8}, grid.placement()), Error);
+    const Placement at = read_nanovdb(folder / "v.nvdb", grid.extent()).placement();
+    EXPECT_EQ(at.cell_size_m, grid.placement().cell_size_m);
+    for (int a = 0; a < 3; ++a) EXPECT_NEAR(at.origin_m[a], grid.placement().origin_m[a], 1e-9);
+    EXPECT_THROW(read_nanovdb(folder / "v.nvdb", {8, 8, 8}), Error);
     const std::vector<float> exact = grid.to_dense();
     for (const NanoQuantise quantise : {NanoQuantise::fp16, NanoQuantise::fp8}) {
         write_nanovdb(folder / "q.nvdb", grid, NanoCodec::none, quantise);
-        const std::vector<float> read =
-            read_nanovdb(folder / "q.nvdb", grid.extent(), grid.placement()).to_dense();
+        const std::vector<float> read = read_nanovdb(folder / "q.nvdb", grid.extent()).to_dense();
         ASSERT_EQ(read.size(), exact.size());
         float worst = 0;
         for (std::size_t n = 0; n < exact.size(); ++n) worst = std::max(worst, std::abs(read[n] - exact[n]));
@@ -328,7 +334,7 @@ TEST(Containers, NanoVdbHoldsUniformBlocks) {
     const DensityGrid grid = DensityGrid::from_dense(values, extent, {{0, 0, 0}, 10});
     for (const NanoQuantise quantise : {NanoQuantise::none, NanoQuantise::fp16}) {
         write_nanovdb(folder / "t.nvdb", grid, NanoCodec::zip, quantise);
-        const std::vector<float> read = read_nanovdb(folder / "t.nvdb", extent, grid.placement()).to_dense();
+        const std::vector<float> read = read_nanovdb(folder / "t.nvdb", extent).to_dense();
         ASSERT_EQ(read.size(), values.size());
         float worst = 0;
         for (std::size_t n = 0; n < values.size(); ++n)
@@ -336,7 +342,7 @@ TEST(Containers, NanoVdbHoldsUniformBlocks) {
         EXPECT_LE(worst, quantise == NanoQuantise::none ? 0.0f : 1e-5f);
     }
     for (const Extent& less : {Extent{135, 128, 136}, Extent{136, 127, 136}, Extent{136, 128, 64}})
-        EXPECT_THROW(read_nanovdb(folder / "t.nvdb", less, grid.placement()), Error);
+        EXPECT_THROW(read_nanovdb(folder / "t.nvdb", less), Error);
 }
 
 // Every voxel of every level is in a brick, its neighbours are in the border, and empty bricks have no data.
@@ -410,6 +416,36 @@ TEST(Bricks, AreReadBackAndHaveTheirNeighbours) {
     }
     EXPECT_GT(empty, 0u);
     EXPECT_GT(checked, 10000u);
+}
+
+// Compares what readers skip by, and what linear filters see, beside the levels.
+TEST(Bricks, ChecksSeeBordersAndRanges) {
+    const TemporaryFolder folder;
+    const std::vector<Volume> levels{lay_out(random_grid({40, 24, 16}, 9), {})};
+    const BrickOptions options{8, VoxelType::r8, 1, {true, false, false}};
+    write_bricks(folder / "v.bricks", levels, options);
+    const auto check = [&](const std::string& name) {
+        check_bricks(folder / name, levels, options, 1, [](float) { return 0.5 / 255 + 1e-6; });
+    };
+    EXPECT_NO_THROW(check("v.bricks"));
+    const std::vector<char> whole = test::bytes_of(folder / "v.bricks");
+    constexpr std::size_t kTable = 32 + 12, kEntry = 40, kSide = 10, kBricks = 5 * 3 * 2,
+                          kFirst = kTable + kEntry * kBricks;
+    const auto says = [&](std::size_t at, std::vector<char> bytes, const std::string& text) {
+        std::vector<char> changed = whole;
+        std::ranges::copy(bytes, changed.begin() + std::ptrdiff_t(at));
+        test::write_bytes(folder / "changed.bricks", changed);
+        EXPECT_NO_THROW(read_bricks(folder / "changed.bricks"));
+        try {
+            check("changed.bricks");
+            ADD_FAILURE() << "byte " << at;
+        } catch (const Error& error) {
+            EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
+        }
+    };
+    const std::size_t border = kFirst + (4 * kSide + 4) * kSide;  // of the opposite side
+    says(border, {char(whole[border] ^ 0x40)}, "brick 0 or its border has ");
+    says(kTable + kEntry + 36, {0, 0, 0, 0}, "brick 1 states values from ");
 }
 
 TEST(Bricks, DamagedFilesAreRefused) {

@@ -356,6 +356,19 @@ class Export(Case):
         self.call("export", "apart.vdb", "--to", "vdb", "--to", "nvdb", "-o", "apart")
         self.call("verify", "apart")
 
+    def test_halves_hold_means(self):
+        """One value beyond 16-bit floats among many whose mean is not."""
+        self.write_apart(16)
+        import pyopenvdb
+        grid = pyopenvdb.read(str(self.folder / "apart.vdb"), "density")
+        grid.getAccessor().setValueOn((0, 0, 0), 70000)
+        pyopenvdb.write(str(self.folder / "beyond.vdb"), [grid])
+        for name in ("raw", "vdb"):
+            arguments = ("export", "beyond.vdb", "--to", name, "--type", "r16f")
+            self.refused(2, *arguments, "-o", name, says="its largest value is 70000, and 16-bit floats end at 65504")
+            self.call(*arguments, "--voxel", "2", "-o", name)
+            self.call("verify", name)
+
     SLACK = 16  # MiB that a program takes beside what it asks for
 
     def limited(self, mebibytes, *arguments):
@@ -834,6 +847,35 @@ class Export(Case):
             told.add(status)
         self.assertLessEqual({0, 2, 3}, told)
 
+    @unittest.skipIf(SANITIZED, "a sanitizer takes most of the addresses")
+    def test_memory_of_each_frame_is_asked_for(self):
+        """Of a sequence that begins with an empty one, as NanoVDB; and of a wind that is the same everywhere, in voxels twice as large."""
+        import pyopenvdb
+        for number, side in ((1, 1), (2, 128)):
+            grid = pyopenvdb.FloatGrid()
+            grid.copyFromArray(numpy.zeros((128, 128, 128), "f4"))
+            grid.copyFromArray(numpy.random.default_rng(1).random((side, side, side), dtype="f4"))
+            grid.getAccessor().setValueOn((127, 127, 127), 0.5)
+            grid.name = "density"
+            pyopenvdb.write(str(self.folder / f"grows_{number}.vdb"), [grid])
+        told = set()
+        for mebibytes in range(120, 260, 10):
+            shutil.rmtree(self.folder / "grown", ignore_errors=True)
+            status, text = self.limited(mebibytes, "export", "grows_1.vdb", "grows_2.vdb", "--to", "nvdb", "-o", "grown")
+            self.assertNotIn("out of memory while", text)
+            told.add(status)
+        self.assertLessEqual({0, 3}, told)
+        scene = "[lattice]\ncells = [2056, 2056, 8]\ninitial = \"empty\"\n[time]\nsteps = 1\n[field.background]\nhum = 0.001\nact = 0\next = 0\n" \
+                "[[wind]]\nlevels = [{ height_m = 0, from_deg = 240, speed_m_per_s = 7 }]\n"
+        self.call("run", self.write("windy.toml", scene), "--no-render", "--out", "windy")
+        told = set()
+        for mebibytes in range(150, 300, 20):
+            shutil.rmtree(self.folder / "blown", ignore_errors=True)
+            status, text = self.limited(mebibytes, "export", "windy", "--to", "vdb", "--velocity", "v", "-o", "blown")
+            self.assertIn(status, (0, 2, 3), text)
+            told.add(status)
+        self.assertLessEqual({0, 2}, told)
+
     def test_plans_are_of_coarser_voxels(self):
         planned = lambda *arguments: json.loads(self.call("export", "run", *arguments, "--plan", "--json").stdout)["sequences"][0]["estimated_bytes_a_frame"]
         for name in ("vdb", "flightgear"):
@@ -859,6 +901,28 @@ class Export(Case):
             self.assertEqual(max(plan("--size", size, *arguments)["size"]), expected, (size, arguments))
         for size, arguments, least in ((2, ["--border", "zero"], 3), (15, ["--pad", "16"], 16), (3, ["--to", "dds"], 4)):
             self.refused(2, "export", "run", "--to", "raw", "--size", size, *arguments, "-o", "small", says=f"at least {least} voxels")
+
+    def test_the_least_size_of_tiles_is_one_that_is_taken(self):
+        """Whole tiles: what a refusal names counts border, padding and blocks, and voxels beyond the longest side have a cure, too."""
+        scene = self.write("tiles.toml", SCENE.replace("cells = [32, 24, 12]", 'cells = [24, 36, 16]\nboundaries = ["periodic", "periodic", "open"]'))
+        self.call("run", scene, "--no-render", "--out", "tiles")
+        for arguments in (["--to", "dds"], ["--to", "raw", "--border", "zero"], ["--to", "raw"], ["--to", "vdb"]):
+            error = self.refused(2, "export", "tiles", *arguments, "--size", "1", "-o", "tiled", says="voxels").stderr
+            least = re.search("at least ([0-9]+) voxels", error)[1]
+            self.call("export", "tiles", *arguments, "--size", least, "--plan")
+            self.refused(2, "export", "tiles", *arguments, "--size", int(least) - 1, "--plan", says=f"at least {least} voxels")
+        edge = json.loads(self.call("export", "tiles", "--to", "raw", "--plan", "--json").stdout)["sequences"][0]["voxel_size_m"][0]
+        for factor in (36, 37, 10_000):
+            self.refused(2, "export", "tiles", "--to", "raw", "--voxel", factor * edge, "--plan", says=f"expected --voxel {12 * edge:g}\n")
+
+    def test_a_refused_export_has_made_nothing(self):
+        import pyopenvdb
+        grid = pyopenvdb.FloatGrid()
+        grid.fill((0, 0, 0), (7, 7, 7), 1e-30)
+        grid.name = "density"
+        pyopenvdb.write(str(self.folder / "small.vdb"), [grid])
+        self.refused(2, "export", "small.vdb", "--to", "nvdb", "--quantise", "fp16", "-o", "refused", says="expected --quantise none")
+        self.assertIn("the export has made nothing yet: it was refused or interrupted", self.call("verify", "refused", status=1).stdout)
 
     def export_again(self):
         shutil.rmtree(self.folder / "out")
@@ -1050,6 +1114,72 @@ class Export(Case):
             if file["path"] == name:
                 file.update(bytes=len(content), xxh3=xxhash.xxh3_128_hexdigest(content))
         (folder / "export.json").write_text(unsealed(listing))
+
+    def test_what_lies_beside_the_voxels_is_compared(self):
+        """Places, borders and ranges of bricks, colours of a picture: each changed in a file whose checksum is right."""
+        import struct
+        from PIL import Image
+        folder = self.export("out", "--to", "nvdb", "--to", "vti", "--to", "bricks", "--bricks", "8", "--mips", "--to", "flightgear")
+        size = json.loads((folder / "placed.volume.json").read_text())["voxel_size_m"][0]
+
+        def changed(name, change, says):
+            whole = (folder / name).read_bytes()
+            (folder / name).write_bytes(change(whole))
+            self.relisted(folder, name)
+            self.assertIn(says, self.call("verify", "out", status=1).stdout)
+            (folder / name).write_bytes(whole)
+            self.relisted(folder, name)
+
+        def recoloured(channel, value):
+            def change(_):
+                picture = numpy.array(Image.open(folder / "placed_0003.voxels.png"))
+                picture[0, 0, channel] = value
+                Image.fromarray(picture).save(self.folder / "picture.png")
+                return (self.folder / "picture.png").read_bytes()
+            return change
+        elsewhere = "lies at another place than its source"
+        changed("placed_0003.nvdb", lambda file: file.replace(struct.pack("<d", size), struct.pack("<d", size * 2)), elsewhere)
+        changed("placed_0003.vti", lambda file: file.replace(b'Origin="', b'Origin="9'), elsewhere)
+        changed("placed_0003.vti", lambda file: file.replace(b'Spacing="', b'Spacing="9'), elsewhere)
+        levels, bricks = struct.unpack_from("<IQ", (folder / "placed_0003.bricks").read_bytes(), 20)
+        first = 32 + 12 * levels
+        entries = [struct.unpack_from("<4I2Q2f", (folder / "placed_0003.bricks").read_bytes(), first + 40 * n) for n in range(bricks)]
+        full = next(n for n, entry in enumerate(entries) if entry[5] > 0)
+        corner = entries[full][4]
+        changed("placed_0003.bricks", lambda file: file[:corner] + bytes([file[corner] ^ 0x80]) + file[corner + 1:], f"brick {full} or its border has")
+        for at in (32, 36):
+            changed("placed_0003.bricks", lambda file, at=first + 40 * full + at: file[:at] + struct.pack("<f", 7) + file[at + 4:],
+                    f"brick {full} states values from")
+        for channel, value in ((0, 9), (1, 77), (3, 254)):
+            changed("placed_0003.voxels.png", recoloured(channel, value), "expected a picture that nephos has written")
+        self.call("verify", "out")
+
+    def test_codes_of_a_narrow_leaf_are_compared(self):
+        """A leaf of NanoVDB has codes from its least to its greatest value."""
+        import pyopenvdb
+        values = numpy.linspace(0.9981, 1, 16 ** 3, dtype=numpy.float32).reshape(16, 16, 16)
+        grid = pyopenvdb.FloatGrid()
+        grid.copyFromArray(values)
+        grid.name = "density"
+        pyopenvdb.write(str(self.folder / "narrow.vdb"), [grid])
+        for quantise, width in (("fp8", 1), ("fp16", 2)):
+            self.call("export", "narrow.vdb", "--to", "nvdb", "--quantise", quantise, "-o", quantise)
+            self.call("verify", quantise)
+            file = next((self.folder / quantise).glob("*.nvdb"))
+            whole = file.read_bytes()
+            file.write_bytes(whole[:-512 * width] + bytes(512 * width))
+            self.relisted(self.folder / quantise, file.name)
+            self.assertIn("FAIL  nvdb", self.call("verify", quantise, status=1).stdout)
+
+    def test_what_is_cut_is_told(self):
+        self.write_apart(24)
+        import pyopenvdb
+        grid = pyopenvdb.read(str(self.folder / "apart.vdb"), "density")
+        grid.getAccessor().setValueOn((0, 0, 0), 3)
+        pyopenvdb.write(str(self.folder / "cut.vdb"), [grid])
+        said = self.call("export", "cut.vdb", "--to", "flightgear", "-o", "cut").stderr
+        self.assertIn("values up to 3 are above 1, and are cut in r8, r16, bc4 and flightgear", said)
+        self.assertIn("1 voxels above the scale are cut", self.call("verify", "cut").stdout)
 
     def test_sidecars_that_lie(self):
         folder = self.export("out", "--to", "raw", "--type", "r8", "--mips", "--pad", "64")
