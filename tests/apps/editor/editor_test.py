@@ -311,6 +311,14 @@ class Window(Case):
                   + 3 * "key ,\n" + "click >\n" + 2 * "click <\n" + "wait 0.5\nwait-picture\npicture shown-%.png\n")
         self.assertEqual(sorted(path.name for path in self.folder.glob("shown-*.png")), ["shown-2.png", "shown-6.png"])
 
+    def test_checkpoints_in_turn_go_back_one_by_one(self):
+        """Also where a step is long, and the next key comes before it is taken."""
+        scene = self.folder / "long.toml"
+        scene.write_text("seed = 4\n[lattice]\ncells = [256, 256, 128]\n[time]\nsteps = 40\n", encoding="utf-8")
+        marks = "".join("key .\n" * 2 + f"wait-step {step}\nwait-picture\nkey M\n" for step in (2, 4, 6))
+        self.edit(scene, script="wait 0.5\nkey SPACE\nkey HOME\nwait-step 0\n" + marks + 2 * "key B\n" + "wait 0.5\nwait-picture\npicture shown-%.png\n")
+        self.assertEqual([path.name for path in self.folder.glob("shown-*.png")], ["shown-2.png"])
+
     def test_slider_shows_in_the_picture(self):
         """A sun below the horizon darkens the picture, and undo brings the day back."""
         self.edit(self.scene("cumulus-by-hand.toml"), "--validation", script="""

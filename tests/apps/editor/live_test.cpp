@@ -196,6 +196,15 @@ TEST(LiveScene, FailuresAreSaidAndAnotherSceneGoesOn) {
         live.seek(7);
         ASSERT_TRUE(comes([&] { return live.status().step == 7; }));
     }
+    // One that fails while it is closed is nobody's failure.
+    for (int n = 0; n < 100; ++n) {
+        const std::uint64_t version = live.status().rows_version;
+        live.start(huge, 5);
+        std::this_thread::sleep_for(std::chrono::microseconds(2 * n));
+        live.clear();
+        ASSERT_TRUE(comes([&] { return live.status().rows_version != version; }));
+        ASSERT_EQ(live.status().failure, "") << n;
+    }
 }
 
 std::string layer_text(const std::string& name) {
