@@ -10,14 +10,16 @@
 #include <new>
 #include <ostream>
 #include <stdexcept>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include <ext/stdio_filebuf.h>
 #include <fcntl.h>
+#include <zlib.h>
 
 #define NANOVDB_USE_OPENVDB
 #define NANOVDB_USE_ZIP
-#define NANOVDB_USE_BLOSC
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wold-style-cast"
 #pragma GCC diagnostic ignored "-Wcast-qual"
@@ -71,13 +73,34 @@ bool is_of_memory(const std::exception& error) {
     return dynamic_cast<const std::bad_alloc*>(&error) != nullptr || what.ends_with("malloc failed");
 }
 
+// What follows the head of a file: its bytes, and, of compressed ones, their number before them.
+struct Payload {
+    std::vector<char> compressed;  // of them
+    std::string stated;
+    std::string_view bytes;
+};
+
+// The library's own writer takes no notice of a compression that fails. Throws std::bad_alloc, for nothing else fails in it.
+Payload payload_of(const nanovdb::GridHandle<>& handle, NanoCodec codec) {
+    const auto* data = reinterpret_cast<const char*>(handle.data());
+    if (codec == NanoCodec::none) return {{}, {}, {data, handle.size()}};
+    Payload payload;
+    uLongf size = compressBound(uLong(handle.size()));
+    payload.compressed.resize(size);
+    if (compress(reinterpret_cast<Bytef*>(payload.compressed.data()), &size,
+                 reinterpret_cast<const Bytef*>(data), uLong(handle.size())) != Z_OK)
+        throw std::bad_alloc();
+    const nanovdb::io::fileSize_t stated = size;
+    payload.stated.assign(reinterpret_cast<const char*>(&stated), sizeof stated);
+    payload.bytes = {payload.compressed.data(), size};
+    return payload;
+}
+
 }  // namespace
 
 void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
                    NanoQuantise quantise) {
     openvdb::initialize();
-    constexpr nanovdb::io::Codec kCodecs[] = {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP,
-                                              nanovdb::io::Codec::BLOSC};
     const nanovdb::GridHandle<> handle = [&] {
         try {
             return converted(*described(density), quantise);
@@ -86,16 +109,17 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
             throw Error(ErrorCode::io, path.string() + ": cannot convert to NanoVDB: " + error.what());
         }
     }();
+    const Payload payload = payload_of(handle, codec);
+    nanovdb::io::Segment segment(codec == NanoCodec::zip ? nanovdb::io::Codec::ZIP
+                                                         : nanovdb::io::Codec::NONE);
+    segment.add(handle);
+    segment.meta.front().fileSize = payload.stated.size() + payload.bytes.size();
     write_atomically(path, [&](const std::filesystem::path& temporary) {
         VdbOutput file(temporary);
         std::ostream stream(&file);
-        try {
-            if (file.error() == 0) nanovdb::io::writeGrid(stream, handle, kCodecs[std::size_t(codec)]);
-        } catch (const std::bad_alloc&) {
-            throw;
-        } catch (const std::exception&) {
-            file.fail(path);
-        }
+        if (file.error() == 0) segment.write(stream);
+        for (const std::string_view part : {std::string_view(payload.stated), payload.bytes})
+            stream.write(part.data(), std::streamsize(part.size()));
         if (!stream || !file.close()) file.fail(path);
     });
 }

@@ -11,7 +11,7 @@
 
 namespace nephos {
 
-enum class NanoCodec { none, zip, blosc };    // compression of the file
+enum class NanoCodec { none, zip };           // compression of the file
 enum class NanoQuantise { none, fp8, fp16 };  // bits of a value, by the range of its leaf
 
 // Returns the largest code of a value; of fp8 or fp16.

@@ -73,10 +73,10 @@ void require_space(const ExportOptions& options, const std::vector<ExportSequenc
             }
         }
     }
-    std::filesystem::path at = std::filesystem::absolute(options.folder);
-    while (!std::filesystem::exists(at) && at.has_parent_path() && at != at.parent_path())
-        at = at.parent_path();
     std::error_code error;
+    std::filesystem::path at = std::filesystem::absolute(options.folder, error);
+    while (!std::filesystem::exists(at, error) && at.has_parent_path() && at != at.parent_path())
+        at = at.parent_path();
     const auto space = std::filesystem::space(at, error);
     if (error || space.available >= bytes) return;
     throw Error(ErrorCode::io,

@@ -147,14 +147,14 @@ double billows_of(const std::string& genus) {
 void require_halves(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
                     const DensityGrid& density) {
     constexpr float kLargestHalf = 65504;
-    float largest = density.max_value();
-    const bool may_be_beyond = largest > kLargestHalf * std::min(1.0f, s.scale);
-    if (may_be_beyond && s.layout.factor > 1) largest = coarser(density, s.layout.factor).max_value();
     for (const ExportFormat format : all_formats(options)) {
         const bool is_vdb = format == ExportFormat::vdb;
         const bool halves = is_vdb ? options.type == VoxelType::r16f
                                    : is_dense(format) && type_of(options, format) == VoxelType::r16f;
-        if (!halves || !(largest > kLargestHalf * (is_vdb ? 1 : s.scale))) continue;
+        const float most = kLargestHalf * (is_vdb ? 1 : s.scale);
+        if (!halves || !(density.max_value() > most)) continue;
+        const float largest = coarser(density, s.layout.factor).max_value();
+        if (!(largest > most)) continue;
         throw Error(
             ErrorCode::usage,
             fmt::format("{}: its largest value{} is {:g}, and 16-bit floats end at {:g}: expected --type "

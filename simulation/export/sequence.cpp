@@ -185,8 +185,8 @@ int factor_of(const ExportOptions& options, const ExportSequence& s) {
     if (options.voxel_m) {
         const double ratio = *options.voxel_m / edge;
         if (ratio < 0.999 || std::abs(ratio - std::round(ratio)) > 1e-6 * ratio || ratio > 1 << 20) {
-            const double near =
-                std::clamp(std::round(ratio), 1.0, double(std::ranges::max(sides_of(s)))) * edge;
+            const double most = std::ranges::max(sides_of(s));
+            const double near = factor_near(s, int(std::clamp(std::round(ratio), 1.0, most)), -1) * edge;
             throw Error(ErrorCode::usage, fmt::format("--voxel {:g}: the grid's voxels are {:g} m, and only "
                                                       "means of whole numbers of them keep the mass: "
                                                       "expected a multiple such as {:.9g}",

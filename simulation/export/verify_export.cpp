@@ -391,14 +391,16 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
             for (const ExportedFile& file : noted_files(folder)) names.insert(file.path);
         } catch (const Error&) {  // another user's; what they name is then told as listed nowhere
         }
-        const bool is_empty = names.size() == 2;  // but for the list and the hidden folder
-        result.checks.push_back({"complete", false,
-                                 is_empty ? "the export has made nothing yet: it was refused or interrupted"
-                                          : "the export was interrupted: the same command goes on"});
     }
     std::vector<std::filesystem::path> extra;
     for (const std::string& name : names_in_folder(folder))
         if (!names.contains(name)) extra.emplace_back(name);
+    const bool is_empty =
+        extra.empty() && names == std::set<std::filesystem::path>{"export.json", kExportWork};
+    if (!list.complete)
+        result.checks.push_back({"complete", false,
+                                 is_empty ? "the export has made nothing yet: it was refused or interrupted"
+                                          : "the export was interrupted: the same command goes on"});
     for (Check& check : check_files(folder, files, extra)) result.checks.push_back(std::move(check));
     if (!options.hashes_only) {
         for (Check& check : check_sidecars(folder, list)) result.checks.push_back(std::move(check));

@@ -186,7 +186,28 @@ class InterruptedExport(Case):
             self.export("out", "--to", "raw")
             shutil.rmtree(self.folder / "out")
 
+    def test_what_is_compressed_without_memory_is_not_written(self):
+        """zlib and libpng tell a lack of memory in their own way, at any of its allocations."""
+        arguments = ("--to", "nvdb", "--to", "vti", "--zip", "--to", "slices", "--frames", "3..3", "-j", "1")
+        whole = self.export("whole", *arguments)
+        failed = 0
+        for number in range(1, 120):
+            shutil.rmtree(self.folder / "out", ignore_errors=True)
+            done = subprocess.run([NEPHOS, "export", "run", *arguments, "-o", "out"], cwd=self.folder, capture_output=True, text=True, check=False,
+                                  env={**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"allocate ENOMEM {number} 1"})
+            self.assertIn(done.returncode, (0, 2, 3), done.stderr)
+            self.assertNotIn("Warning", done.stderr)
+            failed += done.returncode != 0
+            if done.returncode == 0:
+                for file in whole.iterdir():
+                    self.assertEqual((self.folder / "out" / file.name).read_bytes(), file.read_bytes(), (number, file.name))
+        self.assertGreater(failed, 0)
+
     def test_a_run_that_cannot_be_examined_is_still_one(self):
+        """Nor does a plan need the folder that it is for."""
+        (self.folder / "loop").symlink_to("loop")
+        for folder in ("loop/x", "n" * 300):
+            self.assertIn("nothing was written", self.call("export", "run", "--to", "raw", "--plan", "-o", folder).stdout)
         for path in ("run/manifest.json", "run"):
             for number in range(1, 5):
                 error = self.faulty(f"stat EIO {number} 1", path, "--to", "raw", "--to", "metar", "-o", "out", status=3)
