@@ -334,9 +334,10 @@ void check_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
         if (head.edge != options.edge || head.volume.type != options.type ||
             head.volume.levels.size() != levels.size())
             bad("its bricks are of another edge or type, or of other levels");
-        std::uint64_t n = 0;
+        std::uint64_t n = 0, end = kHeadBytes + kLevelBytes * levels.size() + kEntryBytes * head.bricks;
         for_each_brick(levels, options.edge, [&](const Entry& expected) {
             const Entry entry = read_entry(reader);
+            end = std::max(end, entry.offset + entry.bytes);
             if (std::tie(entry.level, entry.i, entry.j, entry.k) !=
                 std::tie(expected.level, expected.i, expected.j, expected.k))
                 bad_brick(n, "is another one than its place says");
@@ -356,6 +357,7 @@ void check_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
             }
             ++n;
         });
+        if (file.size() != end) bad("it does not end behind its bricks");
         return n;
     });
 }

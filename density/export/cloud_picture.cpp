@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <deque>
+#include <new>
 #include <optional>
 
 #include <png.h>
@@ -194,8 +195,12 @@ CloudVoxels read_cloud_picture(const std::filesystem::path& path) {
         const std::span<const std::byte> bytes = reader.rest();
         png_image image{};
         image.version = PNG_IMAGE_VERSION;
-        if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
+        const auto check = [&](int status) {
+            if (status != 0) return;
+            if (is_lack_of_memory(image.message)) throw std::bad_alloc();
             throw Error(ErrorCode::io, "it is no PNG file, or is damaged");
+        };
+        check(png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()));
         image.format = PNG_FORMAT_RGBA;
         CloudVoxels cloud{int(image.height), int(image.width / std::max(1u, image.height)), {}, 0};
         const bool known = std::ranges::find(kSides, cloud.side) != std::end(kSides);
@@ -207,8 +212,7 @@ CloudVoxels read_cloud_picture(const std::filesystem::path& path) {
             throw Error(ErrorCode::io, "it is no picture of a cloud's voxels");
         }
         std::vector<std::uint8_t> pixels(PNG_IMAGE_SIZE(image));
-        if (png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr) == 0)
-            throw Error(ErrorCode::io, "it is no PNG file, or is damaged");
+        check(png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr));
         const auto side = std::size_t(cloud.side), width = std::size_t(image.width);
         std::optional<std::uint8_t> type;
         cloud.codes.resize(side * side * std::size_t(cloud.height));

@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include <ext/stdio_filebuf.h>
@@ -26,6 +27,7 @@
 #pragma GCC diagnostic ignored "-Wshadow"
 #pragma GCC diagnostic ignored "-Wextra"
 #pragma GCC diagnostic ignored "-Wall"
+#include <nanovdb/util/GridChecksum.h>
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 #pragma GCC diagnostic pop
@@ -104,6 +106,8 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
     const nanovdb::GridHandle<> handle = [&] {
         try {
             return converted(*described(density), quantise);
+        } catch (const std::system_error&) {  // of a thread that cannot start for want of addresses
+            throw std::bad_alloc();
         } catch (const std::exception& error) {
             if (is_of_memory(error)) throw std::bad_alloc();
             throw Error(ErrorCode::io, path.string() + ": cannot convert to NanoVDB: " + error.what());
@@ -125,8 +129,8 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
 }
 
 std::uint64_t nanovdb_work_bytes(std::uint64_t grid_bytes, NanoCodec codec, NanoQuantise quantise) {
-    const std::uint64_t bits = quantise == NanoQuantise::none ? 32 : quantise == NanoQuantise::fp16 ? 16 : 8;
-    const std::uint64_t grid = grid_bytes / 16 + grid_bytes / 32 * bits;  // nodes and masks, and voxels
+    const std::uint64_t grid =
+        grid_bytes / 16 + grid_bytes / 32 * std::uint64_t(bits_of(quantise));  // nodes and masks, and voxels
     return codec == NanoCodec::zip ? 2 * grid : grid;
 }
 
@@ -179,6 +183,9 @@ template <class Build>
 bool send_grid_of(const nanovdb::GridHandle<>& handle, const CoordBBox& extent, SandboxWriter& writer) {
     const nanovdb::NanoGrid<Build>* grid = handle.grid<Build>();
     if (grid == nullptr) return false;
+    // Partial: of its head, for which the library starts no threads.
+    if (!nanovdb::validateChecksum(*grid, nanovdb::ChecksumMode::Partial))
+        throw std::runtime_error("its own checksum is of another head");
     const auto& root = grid->tree().root();
     for (auto child = root.beginChild(); child; ++child) send_node(writer, extent, *child);
     for (auto tile = root.beginValueOn(); tile; ++tile) {
@@ -188,8 +195,22 @@ bool send_grid_of(const nanovdb::GridHandle<>& handle, const CoordBBox& extent, 
     return true;
 }
 
+// Returns whether a map is of doubles, of floats, which renderers on graphics cards take, and backwards the same.
+bool is_consistent(const nanovdb::Map& map) {
+    constexpr double kRounding = 1e-12;
+    for (int n = 0; n < 9; ++n) {
+        const double backwards = n % 4 == 0 ? 1 / map.mMatD[n] : 0;
+        if (map.mMatF[n] != float(map.mMatD[n]) || map.mInvMatF[n] != float(map.mInvMatD[n])) return false;
+        if (!(std::abs(map.mInvMatD[n] - backwards) <= kRounding * std::abs(backwards))) return false;
+    }
+    for (int n = 0; n < 3; ++n)
+        if (map.mVecF[n] != float(map.mVecD[n])) return false;
+    return map.mTaperD == 1 && map.mTaperF == 1;
+}
+
 // Size and places of voxels: a matrix, and what the centre of the first voxel is moved by.
 void send_map(SandboxWriter& writer, const nanovdb::Map& map) {
+    if (!is_consistent(map)) throw std::runtime_error("its maps contradict each other");
     for (const double number : map.mMatD) writer.value(number);
     for (const double number : map.mVecD) writer.value(number);
 }

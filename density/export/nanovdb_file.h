@@ -17,6 +17,11 @@ enum class NanoQuantise { none, fp8, fp16 };  // bits of a value, by the range o
 // Returns the largest code of a value; of fp8 or fp16.
 constexpr int largest_code(NanoQuantise quantise) { return quantise == NanoQuantise::fp8 ? 255 : 65535; }
 
+// Returns the bits of a value.
+constexpr int bits_of(NanoQuantise quantise) {
+    return quantise == NanoQuantise::none ? 32 : quantise == NanoQuantise::fp16 ? 16 : 8;
+}
+
 // Writes atomically. Throws Error(io) naming the file. Thread-safe for different files.
 void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
                    NanoQuantise quantise);

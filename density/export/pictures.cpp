@@ -90,10 +90,10 @@ std::vector<std::byte> unzipped(ByteReader& reader) {
         const std::size_t at = out.size();
         out.resize(at + std::size_t(size));
         uLongf length = uLongf(size);
-        if (uncompress(reinterpret_cast<Bytef*>(out.data() + at), &length,
-                       reinterpret_cast<const Bytef*>(reader.rest().data()), uLong(sizes[n])) != Z_OK ||
-            length != size)
-            throw Error(ErrorCode::io, "a block is damaged");
+        const int status = uncompress(reinterpret_cast<Bytef*>(out.data() + at), &length,
+                                      reinterpret_cast<const Bytef*>(reader.rest().data()), uLong(sizes[n]));
+        if (status == Z_MEM_ERROR) throw std::bad_alloc();
+        if (status != Z_OK || length != size) throw Error(ErrorCode::io, "a block is damaged");
         reader.skip(std::size_t(sizes[n]));
     }
     return out;
@@ -131,13 +131,10 @@ VtiPlace place_of(std::string_view xml) {
             numbers_of<1>(rest.substr(0, rest.find('<')))[0]};
 }
 
-}  // namespace
-
-void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, const VtiPlace& place,
-               bool zip) {
-    const VolumeLevel& top = volume.levels.front();
-    const std::string extent = "0 " + std::to_string(top.nx - 1) + " 0 " + std::to_string(top.ny - 1) +
-                               " 0 " + std::to_string(top.nz - 1);
+// All before the voxels.
+std::string vti_head(const std::array<int, 3>& size, VoxelType type, const VtiPlace& place, bool zip) {
+    const std::string extent = "0 " + std::to_string(size[0] - 1) + " 0 " + std::to_string(size[1] - 1) +
+                               " 0 " + std::to_string(size[2] - 1);
     std::string xml =
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" "
         "header_type=\"UInt64\"";
@@ -150,9 +147,20 @@ void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, c
         "<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">" +
         number_text(place.time_s) + "</DataArray></FieldData>\n";
     xml += "<Piece Extent=\"" + extent + "\">\n<PointData Scalars=\"density\"><DataArray type=\"" +
-           std::string(vtk_type(volume.type)) +
+           std::string(vtk_type(type)) +
            "\" Name=\"density\" format=\"appended\" "
            "offset=\"0\"/></PointData>\n</Piece>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_";
+    return xml;
+}
+
+constexpr std::string_view kVtiEnd = "\n</AppendedData>\n</VTKFile>\n";
+
+}  // namespace
+
+void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, const VtiPlace& place,
+               bool zip) {
+    const VolumeLevel& top = volume.levels.front();
+    const std::string xml = vti_head({top.nx, top.ny, top.nz}, volume.type, place, zip);
     write_pieces_atomically(path, [&](const AppendPiece& append) {
         append(xml);
         std::vector<std::byte> packed;
@@ -161,7 +169,7 @@ void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, c
         if (!zip) append({reinterpret_cast<const char*>(&size), sizeof size});
         const std::vector<std::byte>& data = zip ? packed : top.bytes;
         append({reinterpret_cast<const char*>(data.data()), data.size()});
-        append("\n</AppendedData>\n</VTKFile>\n");
+        append(kVtiEnd);
     });
 }
 
@@ -188,16 +196,24 @@ EncodedVolume read_vti(const std::filesystem::path& path, VtiPlace* place) {
         const std::string_view type = attribute(xml.substr(points), "type");
         for (const VoxelType one : {VoxelType::r8, VoxelType::r16, VoxelType::r32f})
             if (vtk_type(one) == type) volume.type = one;
-        if (place != nullptr) *place = place_of(xml);
         VolumeLevel level{bounds[1] + 1, bounds[3] + 1, bounds[5] + 1, {}};
+        const VtiPlace stated = place_of(xml);
+        const bool zip = xml.find("vtkZLibDataCompressor") != xml.npos;
+        if (text.substr(0, mark + kMark.size()) !=
+            vti_head({level.nx, level.ny, level.nz}, volume.type, stated, zip))
+            throw Error(ErrorCode::io, "its head is not as nephos writes it");
+        if (place != nullptr) *place = stated;
         reader.skip(mark + kMark.size());
-        if (xml.find("vtkZLibDataCompressor") != xml.npos) {
+        if (zip) {
             level.bytes = unzipped(reader);
         } else {
             const auto size = reader.get<std::uint64_t>();
             if (size > reader.rest().size()) throw Error(ErrorCode::io, "it ends inside of its voxels");
             level.bytes.assign(reader.rest().begin(), reader.rest().begin() + std::ptrdiff_t(size));
+            reader.skip(std::size_t(size));
         }
+        if (text.substr(text.size() - reader.rest().size()) != kVtiEnd)
+            throw Error(ErrorCode::io, "it does not end behind its voxels as nephos writes it");
         if (level.nx < 1 || level.ny < 1 || level.nz < 1 ||
             level.bytes.size() != encoded_bytes(level.nx, level.ny, level.nz, volume.type))
             throw Error(ErrorCode::io, "its voxels are not of the size that it states");
@@ -280,7 +296,13 @@ struct GreyPicture {
     int depth = 0;                   // bits of a sample, 8 or 16
     std::vector<std::byte> samples;  // as voxels have them
     const char* problem = "it is no PNG file, or is damaged";
+    bool lacks_memory = false;
 };
+
+[[noreturn]] void note_and_jump(png_structp png, png_const_charp reason) {
+    static_cast<GreyPicture*>(png_get_error_ptr(png))->lacks_memory = is_lack_of_memory(reason);
+    png_longjmp(png, 1);
+}
 
 void take_png(png_structp png, png_bytep data, png_size_t size) {
     auto* picture = static_cast<GreyPicture*>(png_get_io_ptr(png));
@@ -316,12 +338,13 @@ void read_rows(png_structp png, png_infop info, GreyPicture& picture) {
 
 void read_grey(GreyPicture& picture) {
     // Errors jump back; the library's warnings are not for the terminal.
-    png_structp png = png_create_read_struct(
-        PNG_LIBPNG_VER_STRING, nullptr, [](png_structp p, png_const_charp) { png_longjmp(p, 1); },
-        [](png_structp, png_const_charp) {});
+    png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &picture, note_and_jump,
+                                             [](png_structp, png_const_charp) {});
     png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
     if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {  // NOLINT: libpng reports by longjmp
+        const bool lacks_memory = info == nullptr || picture.lacks_memory;
         png_destroy_read_struct(&png, &info, nullptr);
+        if (lacks_memory) throw std::bad_alloc();
         throw Error(ErrorCode::io, picture.problem);
     }
     read_rows(png, info, picture);

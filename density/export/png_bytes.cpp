@@ -5,6 +5,8 @@
 #include <csetjmp>
 #include <cstring>
 #include <exception>
+#include <new>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -82,9 +84,14 @@ std::string png_bytes(const std::filesystem::path& path, const PngShape& shape,
     const std::size_t pixel = std::size_t(shape.channels) * std::size_t(shape.bits / 8);
     Writing writing{shape, fill, {}, std::vector<std::byte>(std::size_t(shape.width) * pixel), {}};
     if (encode(writing)) return std::move(writing.bytes);
+    if (is_lack_of_memory(writing.reason)) throw std::bad_alloc();
     throw Error(ErrorCode::io, path.string() + ": libpng cannot encode a picture of " +
                                    std::to_string(shape.width) + " x " + std::to_string(shape.height) +
                                    " pixels" + (*writing.reason != '\0' ? ": " : "") + writing.reason);
+}
+
+bool is_lack_of_memory(const char* reason) {
+    return std::string_view(reason).find("memory") != std::string_view::npos;
 }
 
 }  // namespace nephos

@@ -282,15 +282,10 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     list.require_free(file_names(options, run, sequences));
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());
-    const auto take = [&](const ExportSequence& s, std::vector<FrameFigures>& of, ExportedFrame&& frame) {
+    const auto take = [&](std::vector<FrameFigures>& of, ExportedFrame&& frame) {
         std::ranges::move(frame.notes, std::back_inserter(notes));
         for (ExportedFrame::File& file : frame.files)
             file.kept ? list.add_kept(std::move(file.listed)) : list.add_written(std::move(file.listed));
-        if (frame.figures.max > s.scale && cuts_values(options))
-            notes.push_back(fmt::format(
-                "{}: values up to {:g} are above {:g}, and are cut in r8, r16, bc4 and flightgear "
-                "(--range auto keeps them)",
-                s.frames[of.size()].file.string(), frame.figures.max, s.scale));
         of.push_back(frame.figures);
         ++done;
     };
@@ -307,7 +302,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
             bool stopped = false;
             WindOfFiles winds;  // those of a run are known
             FramesAtWork work(frames_at_once(options, s),
-                              [&](ExportedFrame&& frame) { take(s, figures[n], std::move(frame)); });
+                              [&](ExportedFrame&& frame) { take(figures[n], std::move(frame)); });
             try {
                 reader.read(s.frames, false,
                             [&](std::size_t index, std::shared_ptr<const LoadedDensity> read) {

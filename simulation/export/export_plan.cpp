@@ -44,13 +44,15 @@ PlannedSequence planned(const ExportOptions& options, const ExportSequence& s) {
     const auto grid = std::uint64_t(std::ceil(double(source) / (factor * factor * factor)));
     for (const ExportFormat format : all_formats(options)) {
         if (format == ExportFormat::flightgear) {
-            plan.estimated_bytes += grid;
+            constexpr std::uint64_t kPicture = 500;  // of nothing
+            plan.estimated_bytes += grid + kPicture;
         } else if (format == ExportFormat::vdb) {
             plan.estimated_bytes += grid * (has_velocity(options, s) ? 2 : 1);
         } else if (format == ExportFormat::nvdb) {
             // Not compressed it has some five times the bytes of a compressed VDB file, and nodes that are there always.
             constexpr std::uint64_t kNodes = 300'000;
-            plan.estimated_bytes += options.zip ? grid : 5 * grid + kNodes;
+            const auto bits = std::uint64_t(bits_of(options.quantise));
+            plan.estimated_bytes += options.zip ? grid * bits / 32 : 5 * grid * bits / 32 + kNodes;
         } else if (is_dense(format)) {
             (has_known_size(options, format) ? plan.bytes_a_frame : plan.estimated_bytes) +=
                 dense_bytes(options, s, format);

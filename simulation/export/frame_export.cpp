@@ -20,6 +20,7 @@
 #include "density/combine.h"
 #include "density/export/bricks.h"
 #include "density/export/cloud_picture.h"
+#include "simulation/export/export_plan.h"
 #include "simulation/memory.h"
 #include "simulation/simulation.h"
 
@@ -183,6 +184,18 @@ void require_codes(const ExportOptions& options, const ExportSequence& s, const 
                     frame.file.string(), largest, least));
 }
 
+// Returns "" unless values, or their means, are above the scale in a type that ends there.
+std::string cut_note(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
+                     const DensityGrid& density) {
+    if (!(density.max_value() > s.scale) || !cuts_values(options)) return {};
+    const float largest = coarser(density, s.layout.factor).max_value();
+    if (!(largest > s.scale)) return {};
+    return fmt::format(
+        "{}: values up to {:.9g} are above {:g}, and are cut in r8, r16, bc4 and flightgear "
+        "(--range auto keeps them)",
+        frame.file.string(), largest, s.scale);
+}
+
 // Returns whether values above 0, of which none is above `largest`, are all 0 in a type.
 bool is_lost(VoxelType type, float largest, float scale) {
     const std::vector<std::byte> code = encode({1, 1, 1, {largest}}, type, scale);
@@ -235,6 +248,8 @@ ExportedFrame FrameExporter::write_files(const ExportSequence& s, const SourceFr
         };
         add(list_.write_file(name, source, name_of(format), write), false);
     }
+    if (std::string note = cut_note(options_, s, frame, loaded.density); !note.empty())
+        result.notes.push_back(std::move(note));
     if (!lost.empty())
         result.notes.push_back(
             fmt::format("{}: nothing of it is left in {}: its values, of which none is above {:g}, or their "

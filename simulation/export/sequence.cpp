@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/paths.h"
 #include "core/text.h"
@@ -75,6 +76,12 @@ std::optional<FileDigest> listed_digest(const RunListing& run, const ListedFrame
     return {};
 }
 
+// Looks again where a look fails. Throws ReadFailure where the system still cannot say.
+FileStamp stamp_of(const std::filesystem::path& file) {
+    const FileStamp stamp = file_stamp(file);
+    return stamp == FileStamp{} && is_there(file) ? file_stamp(file) : stamp;
+}
+
 void read_first(const ExportOptions& options, ExportSequence& s) {
     VdbReadOptions reading;
     reading.grid = options.grid;
@@ -132,7 +139,7 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
                         file.string() + ": its number does not follow that of the file before");
         next = number + 1;
         if (is_wanted(options, int(number), least))
-            s.frames.push_back({file, int(number), 0, {}, file_stamp(file), {}});
+            s.frames.push_back({file, int(number), 0, {}, stamp_of(file), {}});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, "no file has a number of this range");
     read_first(options, s);
@@ -378,7 +385,7 @@ SourceFrame frame_of_run(const RunListing& run, const ListedFrame& frame,
     source.number = frame.number;
     source.time_s = frame.time_s;
     source.utc = utc_at(run.scene.georeference, frame.time_s);
-    source.stamp = file_stamp(source.file);
+    source.stamp = stamp_of(source.file);
     source.listed = listed_digest(run, frame, source.file);
     return source;
 }
@@ -391,7 +398,7 @@ std::string damage_note(const SourceFrame& frame, const FileDigest& read) {
 }
 
 void require_unchanged(const SourceFrame& frame) {
-    if (file_stamp(frame.file) == frame.stamp) return;
+    if (stamp_of(frame.file) == frame.stamp) return;
     throw Error(ErrorCode::io, frame.file.string() + ": was changed while it was exported: export it again");
 }
 

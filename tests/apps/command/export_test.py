@@ -1145,7 +1145,13 @@ class Export(Case):
                 return (self.folder / "picture.png").read_bytes()
             return change
         elsewhere = "lies at another place than its source"
-        changed("placed_0003.nvdb", lambda file: file.replace(struct.pack("<d", size), struct.pack("<d", size * 2)), elsewhere)
+        changed("placed_0003.nvdb", lambda file: file.replace(struct.pack("<d", size), struct.pack("<d", size * 2)), "contradict each other")
+        changed("placed_0003.nvdb", lambda file: file.replace(struct.pack("<f", size), struct.pack("<f", size * 2)), "contradict each other")
+        changed("placed_0003.nvdb", lambda file: file[:208] + file[208:].replace(b"density\0", b"densitx\0"), "its own checksum is of another head")
+        changed("placed_0003.vti", lambda file: file.replace(b'Direction="1 0', b'Direction="0 1'), "its head is not as nephos writes it")
+        changed("placed_0003.vti", lambda file: file.replace(b"LittleEndian", b"BigEndian"), "its head is not as nephos writes it")
+        changed("placed_0003.vti", lambda file: file + b" ", "it does not end behind its voxels")
+        changed("placed_0003.bricks", lambda file: file + b" ", "it does not end behind its bricks")
         changed("placed_0003.vti", lambda file: file.replace(b'Origin="', b'Origin="9'), elsewhere)
         changed("placed_0003.vti", lambda file: file.replace(b'Spacing="', b'Spacing="9'), elsewhere)
         levels, bricks = struct.unpack_from("<IQ", (folder / "placed_0003.bricks").read_bytes(), 20)
@@ -1160,6 +1166,12 @@ class Export(Case):
         for channel, value in ((0, 9), (1, 77), (3, 254)):
             changed("placed_0003.voxels.png", recoloured(channel, value), "expected a picture that nephos has written")
         self.call("verify", "out")
+        for out, edge_m in (("there", 2), ("here", 1)):
+            self.write_apart(16, edge_m)
+            self.call("export", "apart.vdb", "--to", "nvdb", "-o", out)
+        shutil.copy(self.folder / "there/apart_0001.nvdb", self.folder / "here")
+        self.relisted(self.folder / "here", "apart_0001.nvdb")
+        self.assertIn(elsewhere, self.call("verify", "here", status=1).stdout)
 
     def test_codes_of_a_narrow_leaf_are_compared(self):
         """A leaf of NanoVDB has codes from its least to its greatest value."""
@@ -1187,6 +1199,7 @@ class Export(Case):
         said = self.call("export", "cut.vdb", "--to", "flightgear", "-o", "cut").stderr
         self.assertIn("values up to 3 are above 1, and are cut in r8, r16, bc4 and flightgear", said)
         self.assertIn("1 voxels above the scale are cut", self.call("verify", "cut").stdout)
+        self.assertNotIn("are cut", self.call("export", "cut.vdb", "--to", "flightgear", "--voxel", "2", "-o", "means").stderr)
 
     def test_sidecars_that_lie(self):
         folder = self.export("out", "--to", "raw", "--type", "r8", "--mips", "--pad", "64")
