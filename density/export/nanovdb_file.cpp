@@ -75,7 +75,7 @@ bool is_of_memory(const std::exception& error) {
     return dynamic_cast<const std::bad_alloc*>(&error) != nullptr || what.ends_with("malloc failed");
 }
 
-// What follows the head of a file: its bytes, and, of compressed ones, their number before them.
+// Holds what follows the head of a file: its bytes, and, of compressed ones, their number before them.
 struct Payload {
     std::vector<char> compressed;  // of them
     std::string stated;
