@@ -91,7 +91,8 @@ std::string png_bytes(const std::filesystem::path& path, const PngShape& shape,
 }
 
 bool is_lack_of_memory(const char* reason) {
-    return std::string_view(reason).find("memory") != std::string_view::npos;
+    const std::string_view text(reason);  // not "invalid memory read", of a file that ends early
+    return text.find("nsufficient memory") != text.npos || text.find("ut of memory") != text.npos;
 }
 
 }  // namespace nephos

@@ -67,7 +67,7 @@ std::size_t memory_bound(const std::filesystem::path& path) {
     constexpr std::uintmax_t kMost = std::numeric_limits<std::size_t>::max();
     std::error_code error;
     const std::uintmax_t size = std::filesystem::file_size(path, error);
-    if (error) fail(path, error.message());
+    if (error) throw ReadFailure(path, error.message(), "examine");
     return size > (kMost - kLeast) / kPerByte ? kMost : kLeast + kPerByte * size;
 }
 

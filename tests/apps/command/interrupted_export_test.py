@@ -211,6 +211,14 @@ class InterruptedExport(Case):
                                       env={**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"allocate ENOMEM {number} 1"})
                 self.assertIn(done.returncode, (0, 3), done.stdout + done.stderr)
 
+    def test_verify_tells_a_look_that_fails_from_damage(self):
+        for name in ("nvdb", "vdb"):
+            self.export(name, "--to", name, "--frames", "3..3", "--voxel", "100")
+            for number in range(1, 30):
+                done = subprocess.run([NEPHOS, "verify", name], cwd=self.folder, capture_output=True, text=True, check=False,
+                                      env={**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"stat EIO {number} 1", "FAIL_PATH": name + "/"})
+                self.assertIn(done.returncode, (0, 3), done.stdout + done.stderr)
+
     def test_a_look_that_fails_is_no_change(self):
         for number in range(1, 8):
             done = subprocess.run([NEPHOS, "export", "run", "--to", "raw", "--frames", "3..3", "-o", f"look{number}"], cwd=self.folder,
