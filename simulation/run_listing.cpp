@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/run_listing.h"
 
+#include <algorithm>
+#include <system_error>
+
 #include <nlohmann/json.hpp>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/paths.h"
 #include "scenes/format/reader.h"
@@ -26,10 +30,38 @@ ListedFrame frame_of(const Json& json, const std::filesystem::path& manifest) {
     return frame;
 }
 
+bool lists_file(const RunListing& run, const std::filesystem::path& file) {
+    const auto is_file = [&](const FileRecord& record) {
+        return is_same_place(run.folder / record.path, file);
+    };
+    return std::ranges::any_of(run.frames,
+                               [&](const ListedFrame& f) { return std::ranges::any_of(f.files, is_file); }) ||
+           std::ranges::any_of(run.tables, is_file) || std::ranges::any_of(run.run_files, is_file);
+}
+
 }  // namespace
 
 bool is_run_folder(const std::filesystem::path& folder) {
     return type_behind(folder / "manifest.json") == std::filesystem::file_type::regular;
+}
+
+std::optional<std::filesystem::path> run_with_file(const std::filesystem::path& file) {
+    if (type_behind(file) != std::filesystem::file_type::regular) return {};
+    std::error_code failure;
+    const std::filesystem::path place = std::filesystem::canonical(file, failure);
+    if (failure) throw ReadFailure(file, failure.message(), "examine");
+    const std::filesystem::path beside = place.parent_path();
+    for (const std::filesystem::path& folder : {beside, beside.parent_path()}) {
+        if (!is_run_folder(folder)) continue;
+        if (place == folder / "manifest.json") return folder;
+        try {
+            if (lists_file(read_run(folder), place)) return folder;
+        } catch (const ReadFailure&) {
+            throw;
+        } catch (const Error&) {  // damaged, or of another version: then it lists nothing
+        }
+    }
+    return {};
 }
 
 RunListing read_run(const std::filesystem::path& folder) {

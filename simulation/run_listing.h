@@ -45,6 +45,10 @@ bool is_run_folder(const std::filesystem::path& folder);
 // a scene that cannot be read.
 RunListing read_run(const std::filesystem::path& folder);
 
+// Returns the folder of the run that lists the file, or whose manifest it is, links followed; nothing where neither its folder
+// nor the one above has a manifest that can be read. Throws ReadFailure where the system cannot say.
+std::optional<std::filesystem::path> run_with_file(const std::filesystem::path& file);
+
 // Returns the path of the density file of a frame: of a layer, or of all together. Throws Error(usage) that lists the
 // layers when there is none of this name or no such file is written.
 std::filesystem::path density_file(const RunListing& run, const ListedFrame& frame,

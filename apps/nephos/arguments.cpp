@@ -15,6 +15,7 @@
 #include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/warnings.h"
+#include "simulation/run_listing.h"
 
 namespace nephos {
 namespace {
@@ -206,6 +207,12 @@ void refuse_to_replace_files_of(Scene scene, const std::string& to) {
         refuse_to_replace(file.string(), to);
         return file;
     });
+}
+
+void refuse_to_replace_file_of_run(const std::string& to) {
+    if (const auto run = run_with_file(to))
+        throw Error(ErrorCode::usage, to + ": is a file of the run in " + run->string() +
+                                          ": expected the name of another one to write");
 }
 
 void print_scene_errors(const SceneErrors& errors) {

@@ -15,6 +15,7 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/paths.h"
 #include "scenes/format/reader.h"
 #include "simulation/metar_fit.h"
 #include "simulation/run_folder.h"
@@ -119,7 +120,19 @@ void check_options(const MetarArguments& a, const std::optional<Taf>& taf, const
     read_scene_text(text, "the scene of the report");
 }
 
+// Throws Error(usage) when another text stands in the file, as a scene of the user's own or one that was tuned by hand.
+void write_scene(const MetarArguments& a, std::string_view text) {
+    const bool may_be_lost = !a.overwrite && type_behind(a.scene) == std::filesystem::file_type::regular;
+    if (may_be_lost && read_beginning(a.scene, text.size() + 1) != text)
+        throw Error(ErrorCode::usage, a.scene +
+                                          ": is there, and is not the scene of this command: expected the "
+                                          "name of another file, or --overwrite, which replaces it");
+    write_atomically(a.scene, text);
+}
+
 int metar(const MetarArguments& a) {
+    if (a.overwrite && a.scene.empty() && !a.run)
+        throw Error(ErrorCode::usage, "--overwrite requires --scene or --run");
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     const std::string text = report_of(a.report);
     if (a.report.starts_with('@')) refuse_to_replace(a.report.substr(1), a.scene);
@@ -149,7 +162,7 @@ int metar(const MetarArguments& a) {
     Output output;
     if (!a.work.quiet)
         for (const std::string& note : fitted.notes) print_note(note);
-    if (!a.scene.empty()) write_atomically(a.scene, std::string_view(fitted.text));
+    if (!a.scene.empty()) write_scene(a, fitted.text);
     nlohmann::ordered_json json;
     if (a.work.json) {
         nlohmann::ordered_json layers = nlohmann::ordered_json::array();
@@ -218,7 +231,8 @@ void add_metar_command(CLI::App& app, Action& action) {
     command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics")
         ->needs(run);
     command->add_flag("--resume", a->resume, "Go on with the interrupted run in the folder")->needs(run);
-    command->add_flag("--overwrite", a->overwrite, "Remove the run in the folder first")->needs(run);
+    command->add_flag("--overwrite", a->overwrite,
+                      "Replace another scene in the file, and remove the run in the folder first");
     command
         ->add_option("--date", a->options.date,
                      "Month of the report, such as 2024-06, which has only the day: for the sun")

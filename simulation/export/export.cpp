@@ -309,11 +309,8 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                                 const LoadedDensity& loaded = *read;
                                 lock.require_in_place();
                                 SourceFrame& frame = s.frames[index];
-                                if (loaded.metadata) {
-                                    frame.time_s = loaded.metadata->time_s;
-                                    frame.utc = utc_at(loaded.metadata->georeference, frame.time_s);
-                                    winds.add(frame.time_s, loaded.metadata->wind);
-                                }
+                                take_moment(loaded, frame);
+                                if (loaded.metadata) winds.add(frame.time_s, loaded.metadata->wind);
                                 for (const std::string& note : loaded.notes)
                                     notes.push_back(frame.file.string() + ": " + note);
                                 work.add([&, read] {

@@ -362,7 +362,7 @@ ListedExport read_export(const std::filesystem::path& folder) {
     list.complete = root.at("complete").truth();
     for (const CheckedJson& file : root.at("files").items()) list.files.push_back(exported_file(file));
     for (const CheckedJson& s : root.at("sequences").items())
-        list.sequences.push_back({s.at("name").text(), layout_of(s.at("layout")),
+        list.sequences.push_back({s.at("name").text(), s.at("layer").text(), layout_of(s.at("layout")),
                                   int(s.at("levels").integer(1, kMostLevels)),
                                   float(s.at("scale").real(kLeastScale, kLargestScale))});
     const CheckedJson options = root.at("options");

@@ -92,7 +92,7 @@ struct ListedExport {
     bool complete = false;
     std::vector<ExportedFile> files;
     struct Sequence {
-        std::string name;
+        std::string name, layer;  // layer: empty for all together
         VolumeLayout layout;
         int levels = 1;
         float scale = 1;

@@ -85,14 +85,7 @@ FileStamp stamp_of(const std::filesystem::path& file) {
 void read_first(const ExportOptions& options, ExportSequence& s) {
     VdbReadOptions reading;
     reading.grid = options.grid;
-    const LoadedDensity first = load_density(s.frames.front().file, reading);
-    s.extent = first.density.extent();
-    s.grid_bytes = first.density.memory_bytes();
-    s.placement = first.density.placement();
-    s.refine = first.refine;
-    s.of_nephos = first.metadata.has_value();
-    if (first.metadata) s.metadata = *first.metadata;
-    if (s.of_nephos && s.metadata.frames_per_second > 0) s.frames_per_second = s.metadata.frames_per_second;
+    take_first(load_density(s.frames.front().file, reading), s);
 }
 
 ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& run,
@@ -312,6 +305,22 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
 }
 
 }  // namespace
+
+void take_first(const LoadedDensity& first, ExportSequence& s) {
+    s.extent = first.density.extent();
+    s.grid_bytes = first.density.memory_bytes();
+    s.placement = first.density.placement();
+    s.refine = first.refine;
+    s.of_nephos = first.metadata.has_value();
+    if (first.metadata) s.metadata = *first.metadata;
+    if (s.of_nephos && s.metadata.frames_per_second > 0) s.frames_per_second = s.metadata.frames_per_second;
+}
+
+void take_moment(const LoadedDensity& loaded, SourceFrame& frame) {
+    if (!loaded.metadata) return;
+    frame.time_s = loaded.metadata->time_s;
+    frame.utc = utc_at(loaded.metadata->georeference, frame.time_s);
+}
 
 bool is_wanted(const ExportOptions& o, int number, int least) {
     const int first = o.first_frame > 0 ? o.first_frame : least;

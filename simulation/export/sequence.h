@@ -70,6 +70,11 @@ std::optional<RunListing> run_of(const ExportOptions& options);
 std::vector<ExportSequence> list_sequences(const ExportOptions& options, const std::optional<RunListing>& run,
                                            std::vector<std::string>& notes);
 
+// Take what the first frame of a sequence says of all, and what a frame says of its moment. A file of another program says
+// nothing of moments.
+void take_first(const LoadedDensity& first, ExportSequence& sequence);
+void take_moment(const LoadedDensity& loaded, SourceFrame& frame);
+
 // Formats whose files hold the dense box.
 bool is_dense(ExportFormat format);
 // Those of them whose files are compressed: made in memory, and at most about as large as the box.

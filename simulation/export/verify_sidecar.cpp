@@ -2,7 +2,10 @@
 // Sidecars of an export against its list.
 
 #include <algorithm>
-#include <set>
+#include <map>
+#include <new>
+#include <span>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -28,10 +31,15 @@ const NamedFormat& format_of(const CheckedJson& json) {
     return *found;
 }
 
-// The sidecar that an export with this list writes of such a source; frames, time, wind and place are those of the run, and
-// not in it.
+// Compares without regard to the order of keys.
+bool is_same(const nlohmann::ordered_json& a, const nlohmann::ordered_json& b) {
+    return nlohmann::json(a) == nlohmann::json(b);
+}
+
+// The sidecar that an export with this list writes when its first frame, of this number, is of the source; its wind and
+// how many frames there are depend on more.
 nlohmann::ordered_json expected_sidecar(const ListedExport& list, const ListedExport::Sequence& s,
-                                        const LoadedDensity& source) {
+                                        const LoadedDensity& source, int number) {
     ExportOptions options;
     options.layout = s.layout;
     options.half_voxel_shift = list.half_voxel_shift;
@@ -45,46 +53,52 @@ nlohmann::ordered_json expected_sidecar(const ListedExport& list, const ListedEx
     }
     ExportSequence sequence;
     sequence.name = s.name;
-    sequence.frames.emplace_back();
-    sequence.extent = source.density.extent();
-    sequence.placement = source.density.placement();
-    sequence.of_nephos = source.metadata.has_value();
-    if (source.metadata) sequence.metadata = *source.metadata;
+    sequence.layer = s.layer;
+    sequence.frames.push_back({.number = number});
+    take_first(source, sequence);
+    take_moment(source, sequence.frames.front());
     sequence.layout = s.layout;
     sequence.levels = s.levels;
     sequence.scale = s.scale;
-    return nlohmann::ordered_json::parse(sidecar_text(options, sequence, {}));
+    const FrameFigures figures{source.density.sum(), double(source.density.max_value())};
+    return nlohmann::ordered_json::parse(sidecar_text(options, sequence, {figures}));
 }
 
-// The source of the first file of a sequence, where it is there and has not changed.
+using ListedFiles = std::map<std::string, const ExportedFile*>;
+
+// The source of a file, where it is there and has not changed.
 std::optional<LoadedDensity> source_of(const std::filesystem::path& folder, const ListedExport& list,
-                                       const ListedExport::Sequence& s) {
-    for (const ExportedFile& file : list.files) {
-        if (file.source.empty() || sequence_of(list, file.path.generic_string()) != &s) continue;
-        const std::filesystem::path path = folder / file.source;
-        if (!is_there(path)) return {};
-        if (file.source_digest && !(file_digest(path) == *file.source_digest)) return {};
-        VdbReadOptions reading;
-        reading.grid = list.grid;
-        return load_density(path, reading);
-    }
-    return {};
+                                       const ExportedFile& file) {
+    const std::filesystem::path path = folder / file.source;
+    if (file.source.empty() || !is_there(path)) return {};
+    if (file.source_digest && !(file_digest(path) == *file.source_digest)) return {};
+    VdbReadOptions reading;
+    reading.grid = list.grid;
+    return load_density(path, reading);
 }
 
-// What the box of the source and the list decide: everything that places the voxels of a file.
-void check_box(const CheckedJson& json, const nlohmann::ordered_json& parsed,
-               const nlohmann::ordered_json& expected) {
-    for (const char* key :
-         {"quantity", "offset", "extinction_per_m", "size", "order", "axes", "handedness", "unit",
-          "voxel_size_m", "min_m", "max_m", "sample", "period_m", "border", "padding", "half_voxel_shift"}) {
+// Compares the values of these keys, which both objects must have or lack.
+void check_values(const CheckedJson& json, const nlohmann::ordered_json& parsed,
+                  const nlohmann::ordered_json& expected, std::span<const std::string_view> keys) {
+    for (const std::string_view key : keys) {
         if (!expected.contains(key)) {
             if (json.has(key)) json.at(key).fail("no such value");
             continue;
         }
         const CheckedJson value = json.at(key);
-        if (parsed.at(key) != expected.at(key))
+        if (!is_same(parsed.at(key), expected.at(key)))
             value.fail(expected.at(key).dump() + ", as its source has it");
     }
+}
+
+// Compares what the list and the source of the first frame decide: all that places the voxels of a file.
+void check_box(const CheckedJson& json, const nlohmann::ordered_json& parsed,
+               const nlohmann::ordered_json& expected) {
+    constexpr std::string_view kKeys[] = {
+        "layer",    "quantity", "offset",     "extinction_per_m", "size",         "order",  "axes",
+        "unit",     "max_m",    "handedness", "voxel_size_m",     "min_m",        "sample", "border",
+        "period_m", "padding",  "time",       "half_voxel_shift", "georeference", "source"};
+    check_values(json, parsed, expected, kKeys);
     const std::vector<CheckedJson> formats = json.at("formats").items();
     if (formats.size() != expected.at("formats").size())
         json.at("formats").fail(fmt::format("{} formats, as in export.json", expected.at("formats").size()));
@@ -97,17 +111,9 @@ void check_box(const CheckedJson& json, const nlohmann::ordered_json& parsed,
     }
 }
 
-// Throws Error(io) that names the first value which is not what the list says.
-void check_sidecar(const std::filesystem::path& path, const ListedExport& list,
-                   const ListedExport::Sequence& s, const std::set<std::string>& listed,
-                   const std::optional<LoadedDensity>& source) {
-    const nlohmann::ordered_json parsed = parsed_json(path);
-    const CheckedJson json(parsed, path);
-    require_text(json.at("format"), "nephos volume");
-    json.at("format_version").integer(1, 1);
-    require_text(json.at("name"), s.name);
-    if (float(json.at("scale").real(kLeastScale, kLargestScale)) != s.scale)
-        json.at("scale").fail(fmt::format("{}, as in export.json", s.scale));
+// Compares the names and types of its formats. Returns the extensions of their files.
+std::vector<std::string> check_formats(const CheckedJson& json, const ListedExport& list,
+                                       const ListedExport::Sequence& s) {
     std::vector<std::string> extensions;
     for (const CheckedJson& one : json.at("formats").items()) {
         const NamedFormat& format = format_of(one.at("format"));
@@ -117,9 +123,17 @@ void check_sidecar(const std::filesystem::path& path, const ListedExport& list,
         require_text(one.at("files"), frame_pattern(s.name, format));
         extensions.emplace_back(format.extension);
     }
+    if (extensions.empty()) json.at("formats").fail("those of export.json");
+    return extensions;
+}
+
+// Throws Error(io) unless the frames have files in the list, and are all that it has of the sequence.
+void check_numbers(const CheckedJson& json, const ListedExport& list, const ListedExport::Sequence& s,
+                   const ListedFiles& listed, const std::vector<std::string>& extensions) {
     const std::vector<CheckedJson> frames = json.at("frames").items();
     if (json.at("count").integer(0, INT32_MAX) != std::int64_t(frames.size()))
         json.at("count").fail(fmt::format("{}, the number of `frames`", frames.size()));
+    std::int64_t least = json.at("first").integer(0, INT32_MAX);
     for (const CheckedJson& frame : frames) {
         const std::int64_t number = frame.at("number").integer(0, INT32_MAX);
         for (const std::string& extension : extensions) {
@@ -127,16 +141,53 @@ void check_sidecar(const std::filesystem::path& path, const ListedExport& list,
             if (!listed.contains(file))
                 frame.at("number").fail("the number of a listed file: there is no " + file);
         }
-        frame.at("time_s").real(-1e15, 1e15);
+        if (&frame == &frames.front() && number != least)
+            json.at("first").fail(fmt::format("{}, the first of `frames`", number));
+        if (number < least) frame.at("number").fail("one above that of the frame before");
+        least = number + 1;
     }
-    if (source) check_box(json, parsed, expected_sidecar(list, s, *source));
+    const auto files = std::ranges::count_if(list.files, [&](const ExportedFile& file) {
+        const std::string name = file.path.generic_string();
+        return !file.source.empty() && name.ends_with(extensions.front()) && sequence_of(list, name) == &s;
+    });
+    if (list.complete && files != std::ptrdiff_t(frames.size()))
+        json.at("frames").fail(fmt::format("{} frames, as in export.json", files));
+}
+
+// Returns whether all of its sources are there and unchanged. Throws Error(io) that names the first value which is not what the
+// list or a source says.
+bool check_sidecar(const std::filesystem::path& folder, const std::filesystem::path& path,
+                   const ListedExport& list, const ListedExport::Sequence& s, const ListedFiles& listed) {
+    const nlohmann::ordered_json parsed = parsed_json(path);
+    const CheckedJson json(parsed, path);
+    require_text(json.at("format"), "nephos volume");
+    json.at("format_version").integer(1, 1);
+    require_text(json.at("name"), s.name);
+    if (float(json.at("scale").real(kLeastScale, kLargestScale)) != s.scale)
+        json.at("scale").fail(fmt::format("{}, as in export.json", s.scale));
+    const std::vector<std::string> extensions = check_formats(json, list, s);
+    check_numbers(json, list, s, listed, extensions);
+    bool compared = true;
+    const std::vector<CheckedJson> frames = json.at("frames").items();
+    for (std::size_t n = 0; n < frames.size(); ++n) {
+        const int number = int(frames[n].at("number").integer(0, INT32_MAX));
+        const std::string name = fmt::format("{}_{:04}{}", s.name, number, extensions.front());
+        const std::optional<LoadedDensity> source = source_of(folder, list, *listed.at(name));
+        compared = compared && source;
+        if (!source) continue;
+        const nlohmann::ordered_json expected = expected_sidecar(list, s, *source, number);
+        if (n == 0) check_box(json, parsed, expected);
+        constexpr std::string_view kKeys[] = {"time_s", "utc", "sum", "max"};
+        check_values(frames[n], parsed.at("frames").at(n), expected.at("frames").front(), kKeys);
+    }
+    return compared;
 }
 
 }  // namespace
 
 std::vector<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list) {
-    std::set<std::string> listed;
-    for (const ExportedFile& file : list.files) listed.insert(file.path.generic_string());
+    ListedFiles listed;
+    for (const ExportedFile& file : list.files) listed.emplace(file.path.generic_string(), &file);
     std::size_t count = 0, compared = 0;
     Problems bad, unread;
     for (const ListedExport::Sequence& s : list.sequences) {
@@ -149,11 +200,11 @@ std::vector<Check> check_sidecars(const std::filesystem::path& folder, const Lis
                             (folder / "export.json").string() + ": lists volumes, but no " + name);
             }
             ++count;
-            const std::optional<LoadedDensity> source = source_of(folder, list, s);
-            compared += source.has_value();
-            check_sidecar(folder / name, list, s, listed, source);
+            compared += check_sidecar(folder, folder / name, list, s, listed);
         } catch (const ReadFailure& failure) {
             unread.add(failure.what());
+        } catch (const std::bad_alloc&) {
+            unread.add((folder / name).string() + ": cannot compare with its sources: out of memory");
         } catch (const Error& error) {
             const bool is_bad = is_of_file(folder / name, error) || is_of_file(folder / "export.json", error);
             if (!is_bad && !is_of_file(folder, error)) throw;
@@ -162,11 +213,12 @@ std::vector<Check> check_sidecars(const std::filesystem::path& folder, const Lis
     }
     if (count == 0) return {};
     if (bad.none() && !unread.none()) return {unread.not_done("sidecars")};
-    const char* found =
-        compared == count
-            ? "box, axes, levels, names, types, scale and frames are those of list and sources"
-            : "names, types, scale and frames are those of the list; box, axes and levels were not "
-              "compared: sources are not there, or have changed";
+    const char* found = compared == count ? "box, axes, levels, names, types, scale, place, times and "
+                                            "figures of frames are those of list and "
+                                            "sources"
+                                          : "names, types, scale and numbers of frames are those of the "
+                                            "list; not all of box, axes, levels, place, times and "
+                                            "figures was compared: sources are not there, or have changed";
     std::vector<Check> checks{bad.check("sidecars", found)};
     if (!unread.none()) checks.push_back(unread.not_done("sources of sidecars"));
     return checks;

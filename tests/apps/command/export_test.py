@@ -1211,6 +1211,8 @@ class Export(Case):
             return {name: value for name, value in whole.items() if name != key}
         def with_format(**values):
             return dict(whole, formats=[dict(whole["formats"][0], **values)])
+        def with_frame(n, **values):
+            return dict(whole, frames=[dict(frame, **values) if m == n else frame for m, frame in enumerate(whole["frames"])])
         levels = whole["formats"][0]["levels"]
         self.assertGreater(len(levels), 1)
         for sidecar, says in ((without("scale"), "`scale` is missing"), (dict(whole, scale="1"), '`scale` is "1": expected a number'),
@@ -1224,7 +1226,16 @@ class Export(Case):
                               (dict(whole, axes=["north", "east", "up"]), "`axes` is"), (dict(whole, border=1), "`border` is"),
                               (dict(whole, handedness="left"), '`handedness` is "left": expected "right"'),
                               (dict(whole, extinction_per_m=1e-3), "`extinction_per_m` is"), (dict(whole, half_voxel_shift=True), "no such value"),
-                              (with_format(levels=levels[:1]), "`formats[0].levels` is"),
+                              (with_format(levels=levels[:1]), "`formats[0].levels` is"), (dict(whole, formats=[]), "`formats` is a list: expected those of export.json"),
+                              (dict(whole, first=2), "`first` is 2: expected 1, the first of `frames`"),
+                              (with_frame(1, number=1), "`frames[1].number` is 1: expected one above that of the frame before"),
+                              (dict(whole, count=4, frames=whole["frames"][:4]), "expected 5 frames, as in export.json"),
+                              (with_frame(2, sum=whole["frames"][2]["sum"] * 1.000001), "`frames[2].sum` is"),
+                              (with_frame(3, max=whole["frames"][2]["max"]), "`frames[3].max` is"), (with_frame(4, time_s=0), "`frames[4].time_s` is 0"),
+                              (with_frame(1, utc=whole["frames"][2]["utc"]), "`frames[1].utc` is"), (dict(whole, layer="low"), "no such value"),
+                              (dict(whole, time=dict(whole["time"], first_s=5)), "`time` is"), (without("georeference"), "`georeference` is missing"),
+                              (dict(whole, georeference=dict(whole["georeference"], heading_deg=4)), "`georeference` is"),
+                              (dict(whole, source=dict(whole["source"], seed="8")), "`source` is"),
                               (with_format(levels=[dict(levels[0], offset=4), *levels[1:]]), "`formats[0].levels` is")):
             with self.subTest(says=says):
                 (folder / "placed.volume.json").write_text(json.dumps(sidecar))

@@ -57,6 +57,36 @@ class State(Case):
         self.assertEqual(pathlib.Path(self.scene).read_text(), text)
         self.assertIn("LOWW", pathlib.Path(report).read_text())
 
+    def test_files_of_a_run_are_not_replaced(self):
+        self.call("run", self.scene, "--no-render", "--out", "out", "-q")
+        (self.folder / "link").symlink_to("out/density")
+        before = {path: path.read_bytes() for path in (self.folder / "out").rglob("*") if path.is_file()}
+        for file in ("out/density/tiny_0002.vdb", "link/tiny_0002.vdb", "out/manifest.json", "out/statistics.csv"):
+            self.refused(2, "state", self.scene, "--steps", "1", "--out", file, says=f"{file}: is a file of the run in ")
+        self.assertEqual({path: path.read_bytes() for path in (self.folder / "out").rglob("*") if path.is_file()}, before)
+        for _ in range(2):  # what the run does not list may be replaced
+            self.call("state", self.scene, "--steps", "1", "--out", "out/density/state.vdb", "-q")
+            self.call("render", "out/density/tiny_0003.vdb", "--out", "out/picture.png", "--splatting", "cpu", "--size", "32x24", "-q")
+        (self.folder / "out/manifest.json").write_text("{")
+        self.call("state", self.scene, "--steps", "1", "--out", "out/density/tiny_0002.vdb", "-q")
+
+    def test_a_scene_that_was_tuned_is_kept(self):
+        """The scene of a report is written over itself alone, unless the call says so."""
+        call = ("metar", "METAR LOWW 241250Z 30012KT 9999 FEW040 12/05 Q1020", "-o", "sky.toml", "-q")
+        self.call(*call)
+        scene = self.folder / "sky.toml"
+        made = scene.read_text()
+        self.call(*call)
+        for text in (made.replace("seed", "# mine\nseed", 1), made + "\n", made[:-1], "", "mine"):
+            scene.write_text(text)
+            self.refused(2, *call, says="sky.toml: is there, and is not the scene of this command")
+            self.refused(2, *call, "--run", "--no-render", "--out", "run", says="is not the scene of this command")
+            self.assertEqual(scene.read_text(), text)
+        self.assertFalse((self.folder / "run").exists())
+        self.call(*call, "--overwrite")
+        self.assertEqual(scene.read_text(), made)
+        self.refused(2, *call[:2], "--overwrite", says="--overwrite requires --scene or --run")
+
     def test_state_goes_round(self):
         all_steps = self.hashes(self.scene, "--steps", "6").splitlines()
         result = self.call("state", self.scene, "--steps", "6", "--out", "state.vdb")

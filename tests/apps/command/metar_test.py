@@ -78,7 +78,7 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
             with self.subTest(report=report):
                 groups = self.explained(report)["groups"]
                 self.assertEqual(" ".join(g["group"] for g in groups), report.rstrip("="))
-                fitted = json.loads(self.call("metar", report, "-o", "sky.toml", "--json").stdout)
+                fitted = json.loads(self.call("metar", report, "-o", "sky.toml", "--overwrite", "--json").stdout)
                 for layer in fitted["layers"]:
                     self.assertLessEqual(abs(layer["cover"] - layer["wanted"]), 0.5 / 8, layer)
                 self.call("validate", "sky.toml")
@@ -152,7 +152,7 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
         """One begins where another ends, overlaps it or lies within it; moments that no day has are refused."""
         def periods(changes):
             explained = self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, "--explain", "--json")
-            self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, "-o", "taf.toml", "-q")
+            self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, "-o", "taf.toml", "--overwrite", "-q")
             self.call("validate", "taf.toml")
             return json.loads(explained.stdout)
         found = periods("BECMG 2113/2115 BKN030 FM211500 30015KT 9999 SCT045")
@@ -238,7 +238,7 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
             with self.subTest(report=report):
                 for folder in ("run", "back"):
                     shutil.rmtree(self.folder / folder, ignore_errors=True)
-                self.call("metar", report, "-o", "sky.toml", "--date", "2024-06", "--at", "51.5,-0.5,0", "-q")
+                self.call("metar", report, "-o", "sky.toml", "--overwrite", "--date", "2024-06", "--at", "51.5,-0.5,0", "-q")
                 self.call("run", "sky.toml", "--no-render", "--frames", "1", "--out", "run", "-q")
                 self.call("export", "run", "--to", "metar", "-o", "back")
                 back = next((self.folder / "back").glob("*.metar.txt")).read_text().strip()
