@@ -273,7 +273,7 @@ void require_range(std::uint64_t n, const Entry& entry, const std::pair<float, f
 // Returns the codes of brick n, in its order in the table; none of an empty one.
 std::span<const std::byte> brick_in(std::span<const std::byte> file, const Head& head, const Entry& entry,
                                     std::uint64_t n) {
-    if (entry.bytes == 0) return {};
+    if (entry.bytes == 0 && entry.offset == 0) return {};
     const int side = head.edge + 2 * kBorder;
     if (entry.level >= head.volume.levels.size() ||
         entry.bytes != encoded_bytes(side, side, side, head.volume.type) || entry.offset > file.size() ||

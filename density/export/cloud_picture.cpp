@@ -190,10 +190,30 @@ void write_cloud_picture(const std::filesystem::path& path, const CloudVoxels& c
     write_atomically(path, std::string_view(png));
 }
 
+namespace {
+
+// Frees what libpng has made for an image.
+struct PngImageEnd {
+    png_image& image;
+    ~PngImageEnd() { png_image_free(&image); }
+};
+
+// Throws Error(io) unless a PNG file ends with its last chunk, which libpng does not look for.
+void require_end(std::span<const std::byte> file) {
+    constexpr unsigned char kLastChunk[] = {0, 0, 0, 0, 'I', 'E', 'N', 'D', 0xAE, 0x42, 0x60, 0x82};
+    const std::span<const std::byte> last = std::as_bytes(std::span(kLastChunk));
+    if (file.size() < last.size() || !std::ranges::equal(file.last(last.size()), last))
+        throw Error(ErrorCode::io, "it is no PNG file, ends early, or goes on behind its picture");
+}
+
+}  // namespace
+
 CloudVoxels read_cloud_picture(const std::filesystem::path& path) {
     return with_whole_file(path, [](ByteReader& reader) {
         const std::span<const std::byte> bytes = reader.rest();
+        require_end(bytes);
         png_image image{};
+        const PngImageEnd end{image};
         image.version = PNG_IMAGE_VERSION;
         const auto check = [&](int status) {
             if (status != 0) return;
@@ -206,11 +226,8 @@ CloudVoxels read_cloud_picture(const std::filesystem::path& path) {
         const bool known = std::ranges::find(kSides, cloud.side) != std::end(kSides);
         // PNG packs at most 1,032 bytes into one: what states more is damaged, and needs no memory.
         if (!known || image.width % image.height != 0 ||
-            std::uint64_t(image.width) * image.height * kChannels >
-                1032 * std::uint64_t(bytes.size()) + 1024) {
-            png_image_free(&image);
+            std::uint64_t(image.width) * image.height * kChannels > 1032 * std::uint64_t(bytes.size()) + 1024)
             throw Error(ErrorCode::io, "it is no picture of a cloud's voxels");
-        }
         std::vector<std::uint8_t> pixels(PNG_IMAGE_SIZE(image));
         check(png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr));
         const auto side = std::size_t(cloud.side), width = std::size_t(image.width);

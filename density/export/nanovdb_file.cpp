@@ -9,6 +9,7 @@
 #include <istream>
 #include <new>
 #include <ostream>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -20,7 +21,6 @@
 #include <zlib.h>
 
 #define NANOVDB_USE_OPENVDB
-#define NANOVDB_USE_ZIP
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wold-style-cast"
 #pragma GCC diagnostic ignored "-Wcast-qual"
@@ -171,6 +171,97 @@ void send_node(SandboxWriter& writer, const CoordBBox& extent, const Node& node)
     }
 }
 
+// Reads a file from its beginning, and nothing beyond its end.
+class FileBytes {
+  public:
+    explicit FileBytes(std::istream& stream) : stream_(stream) {
+        stream.seekg(0, std::ios::end);
+        left_ = std::uint64_t(stream.tellg());
+        stream.seekg(0);
+        if (!stream) throw std::ios_base::failure("seek", std::make_error_code(std::errc::io_error));
+    }
+    std::uint64_t left() const { return left_; }
+    void read(void* to, std::uint64_t count) {
+        if (count > left_ || !stream_.read(static_cast<char*>(to), std::streamsize(count)))
+            throw std::runtime_error("it ends early");
+        left_ -= count;
+    }
+
+  private:
+    std::istream& stream_;
+    std::uint64_t left_ = 0;
+};
+
+// Inflates what payload_of() wrote to exactly so many bytes.
+void inflate_payload(FileBytes& file, char* to, std::uint64_t size) {
+    nanovdb::io::fileSize_t stated = 0;
+    file.read(&stated, sizeof stated);
+    if (stated != file.left()) throw std::runtime_error("it states more or less bytes than it has");
+    std::vector<Bytef> packed(stated);
+    file.read(packed.data(), stated);
+    uLongf bytes = uLong(size);
+    uLong taken = uLong(stated);
+    const int status = uncompress2(reinterpret_cast<Bytef*>(to), &bytes, packed.data(), &taken);
+    if (status == Z_MEM_ERROR) throw std::bad_alloc();
+    if (status != Z_OK || bytes != size || taken != stated)
+        throw std::runtime_error("its compressed bytes are damaged");
+}
+
+// A file's only grid, and what stands ahead of it.
+struct ReadGrid {
+    nanovdb::io::Segment head;
+    nanovdb::GridHandle<> grid;
+};
+
+// The library's own reader takes no notice of what zlib says, nor of what follows the grid.
+ReadGrid read_grid(std::istream& stream) {
+    FileBytes file(stream);
+    ReadGrid read;
+    file.read(&read.head.header, sizeof read.head.header);
+    const nanovdb::io::Header& header = read.head.header;
+    if (header.magic != NANOVDB_MAGIC_NUMBER) throw std::runtime_error("it does not begin as one");
+    if (header.version.getMajor() != NANOVDB_MAJOR_VERSION_NUMBER)
+        throw std::runtime_error("it is of another version of the format");
+    if (header.gridCount != 1) throw std::runtime_error("it holds no single grid");
+    nanovdb::io::GridMetaData& meta = read.head.meta.emplace_back();
+    file.read(static_cast<nanovdb::io::MetaData*>(&meta), sizeof(nanovdb::io::MetaData));
+    if (meta.nameSize == 0 || meta.nameSize > file.left()) throw std::runtime_error("it ends early");
+    meta.gridName.resize(meta.nameSize);
+    file.read(meta.gridName.data(), meta.nameSize);
+    meta.gridName.pop_back();  // its end
+    const bool is_packed = header.codec == nanovdb::io::Codec::ZIP;
+    if (!is_packed && header.codec != nanovdb::io::Codec::NONE)
+        throw std::runtime_error("it is compressed by other means than zlib");
+    if (meta.fileSize != file.left() || (!is_packed && meta.gridSize != meta.fileSize))
+        throw std::runtime_error("it states more or less bytes than it has");
+    constexpr std::uint64_t kMostPacked = 1032;  // bytes in one of zlib
+    if (meta.gridSize / kMostPacked > file.left())
+        throw std::runtime_error("it states more bytes than it can hold");
+    read.grid = nanovdb::GridHandle<>(nanovdb::HostBuffer::create(meta.gridSize));
+    char* to = reinterpret_cast<char*>(read.grid.data());
+    if (is_packed)
+        inflate_payload(file, to, meta.gridSize);
+    else
+        file.read(to, meta.gridSize);
+    return read;
+}
+
+std::string bytes_of(const nanovdb::io::Segment& head) {
+    std::ostringstream stream;
+    head.write(stream);
+    return std::move(stream).str();
+}
+
+// Throws unless the head says of the grid what the library does: sizes, places, counts and names are in both.
+void require_head_of(const ReadGrid& read) {
+    nanovdb::io::Segment head(read.head.header.codec);
+    head.add(read.grid);
+    head.header.version = read.head.header.version;
+    head.meta.front().version = read.head.header.version;
+    head.meta.front().fileSize = read.head.meta.front().fileSize;
+    if (bytes_of(head) != bytes_of(read.head)) throw std::runtime_error("its head is of another grid");
+}
+
 // The library looks for a grid's type behind as many grids as its index says, wherever that leads.
 void require_one_grid(const nanovdb::GridHandle<>& handle) {
     const nanovdb::GridMetaData* grid = handle.gridMetaData();
@@ -180,12 +271,13 @@ void require_one_grid(const nanovdb::GridHandle<>& handle) {
 }
 
 template <class Build>
-bool send_grid_of(const nanovdb::GridHandle<>& handle, const CoordBBox& extent, SandboxWriter& writer) {
-    const nanovdb::NanoGrid<Build>* grid = handle.grid<Build>();
+bool send_grid_of(const ReadGrid& read, const CoordBBox& extent, SandboxWriter& writer) {
+    const nanovdb::NanoGrid<Build>* grid = read.grid.grid<Build>();
     if (grid == nullptr) return false;
     // Partial: of its head, for which the library starts no threads.
-    if (!nanovdb::validateChecksum(*grid, nanovdb::ChecksumMode::Partial))
+    if (nanovdb::checksum(*grid, nanovdb::ChecksumMode::Partial) != grid->checksum())
         throw std::runtime_error("its own checksum is of another head");
+    require_head_of(read);
     const auto& root = grid->tree().root();
     for (auto child = root.beginChild(); child; ++child) send_node(writer, extent, *child);
     for (auto tile = root.beginValueOn(); tile; ++tile) {
@@ -233,18 +325,14 @@ void send_grid(int file, const Extent& extent, SandboxWriter& writer) {
     __gnu_cxx::stdio_filebuf<char> buffer(file, std::ios::in | std::ios::binary);
     std::istream stream(&buffer);
     stream.exceptions(std::ios::badbit);  // with the system's error
-    const auto handles = nanovdb::io::readGrids(stream);
+    const ReadGrid read = read_grid(stream);
+    require_one_grid(read.grid);
+    send_map(writer, read.grid.gridMetaData()->map());
     const CoordBBox box(openvdb::Coord(0), openvdb::Coord(extent.x - 1, extent.y - 1, extent.z - 1));
-    if (handles.size() == 1) {
-        require_one_grid(handles.front());
-        send_map(writer, handles.front().gridMetaData()->map());
-    }
-    const auto is_sent = [&](const nanovdb::GridHandle<>& handle) {
-        return send_grid_of<float>(handle, box, writer) || send_grid_of<nanovdb::Fp8>(handle, box, writer) ||
-               send_grid_of<nanovdb::Fp16>(handle, box, writer);
-    };
-    if (handles.size() != 1 || !is_sent(handles.front()))
-        throw std::runtime_error("it holds no float grid of 32, 16 or 8 bits");
+    const bool is_sent = send_grid_of<float>(read, box, writer) ||
+                         send_grid_of<nanovdb::Fp8>(read, box, writer) ||
+                         send_grid_of<nanovdb::Fp16>(read, box, writer);
+    if (!is_sent) throw std::runtime_error("it holds no float grid of 32, 16 or 8 bits");
     send_end(writer);
 }
 

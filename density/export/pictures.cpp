@@ -334,6 +334,10 @@ void read_rows(png_structp png, png_infop info, GreyPicture& picture) {
     for (std::uint32_t y = 0; y < picture.height; ++y)
         png_read_row(png, reinterpret_cast<png_bytep>(picture.samples.data() + y * row_bytes), nullptr);
     png_read_end(png, nullptr);
+    if (!picture.left.empty()) {
+        picture.problem = "it goes on behind its picture";
+        png_error(png, picture.problem);
+    }
 }
 
 void read_grey(GreyPicture& picture) {
@@ -347,7 +351,12 @@ void read_grey(GreyPicture& picture) {
         if (lacks_memory) throw std::bad_alloc();
         throw Error(ErrorCode::io, picture.problem);
     }
-    read_rows(png, info, picture);
+    try {
+        read_rows(png, info, picture);
+    } catch (...) {
+        png_destroy_read_struct(&png, &info, nullptr);
+        throw;
+    }
     png_destroy_read_struct(&png, &info, nullptr);
 }
 

@@ -84,10 +84,10 @@ std::string png_bytes(const std::filesystem::path& path, const PngShape& shape,
     const std::size_t pixel = std::size_t(shape.channels) * std::size_t(shape.bits / 8);
     Writing writing{shape, fill, {}, std::vector<std::byte>(std::size_t(shape.width) * pixel), {}};
     if (encode(writing)) return std::move(writing.bytes);
-    if (is_lack_of_memory(writing.reason)) throw std::bad_alloc();
+    if (*writing.reason == '\0' || is_lack_of_memory(writing.reason)) throw std::bad_alloc();
     throw Error(ErrorCode::io, path.string() + ": libpng cannot encode a picture of " +
                                    std::to_string(shape.width) + " x " + std::to_string(shape.height) +
-                                   " pixels" + (*writing.reason != '\0' ? ": " : "") + writing.reason);
+                                   " pixels: " + writing.reason);
 }
 
 bool is_lack_of_memory(const char* reason) {

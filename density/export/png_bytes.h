@@ -21,7 +21,8 @@ struct PngShape {
 
 // Returns the bytes of a file whose rows `fill` makes, from the top one down; `fill` must not throw. The rows are stored as
 // differences between neighbours, whose runs alone are packed: of voxels of clouds that is smaller and four times as fast
-// as zlib's search for repetitions with a filter chosen for each row. Throws Error(io) naming `path`.
+// as zlib's search for repetitions with a filter chosen for each row. Throws Error(io) naming `path`,
+// std::bad_alloc where libpng has no memory.
 std::string png_bytes(const std::filesystem::path& path, const PngShape& shape,
                       const std::function<void(std::uint32_t y, std::span<std::byte> row)>& fill);
 

@@ -248,6 +248,7 @@ EncodedVolume read_ktx2(const std::filesystem::path& path) {
             throw Error(ErrorCode::io, "its format is not supported");
         EncodedVolume volume{VoxelType(found - std::begin(kVulkan)), {}};
         check_size(head[2], head[3], head[4], head[7]);
+        std::uint64_t end = 0;
         for (std::uint32_t n = 0; n < head[7]; ++n) {
             const auto offset = reader.get<std::uint64_t>(), bytes = reader.get<std::uint64_t>();
             reader.skip(std::min<std::size_t>(8, reader.rest().size()));
@@ -259,7 +260,9 @@ EncodedVolume read_ktx2(const std::filesystem::path& path) {
             const auto part = all.subspan(std::size_t(offset), std::size_t(bytes));
             level.bytes.assign(part.begin(), part.end());
             volume.levels.push_back(std::move(level));
+            end = std::max(end, offset + bytes);
         }
+        if (end != all.size()) throw Error(ErrorCode::io, "it does not end behind its levels");
         return volume;
     });
 }

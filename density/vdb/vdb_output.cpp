@@ -54,7 +54,7 @@ VdbOutput::int_type VdbOutput::overflow(int_type character) {
 
 int VdbOutput::sync() { return write_gathered() ? 0 : -1; }
 
-// OpenVDB goes back to what it has written, and asks where it is; NanoVDB leaves room for its header, and goes back to it.
+// OpenVDB goes back to what it has written, and asks where it is.
 VdbOutput::pos_type VdbOutput::seekoff(off_type offset, std::ios_base::seekdir from,
                                        std::ios_base::openmode which) {
     const auto here = off_type(begin_) + (pptr() - pbase());

@@ -136,14 +136,6 @@ ExportReport report_of(const ExportOptions& options, const std::vector<ExportSeq
     return report;
 }
 
-bool cuts_values(const ExportOptions& options) {
-    return std::ranges::any_of(all_formats(options), [&](ExportFormat format) {
-        const VoxelType type = type_of(options, format);
-        const bool codes = type == VoxelType::r8 || type == VoxelType::r16 || type == VoxelType::bc4;
-        return format == ExportFormat::flightgear || (is_dense(format) && codes);
-    });
-}
-
 void require_room(const ExportOptions& options, const std::vector<ExportSequence>& sequences) {
     require_space(options, sequences);
     for (const ExportSequence& s : sequences) require_box(options, s);

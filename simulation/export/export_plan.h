@@ -19,9 +19,6 @@ void check_options(const ExportOptions& options);
 // Returns the files and bytes of sequences.
 ExportReport report_of(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
 
-// Returns whether values above the scale are cut in any of the files.
-bool cuts_values(const ExportOptions& options);
-
 // Throws Error(io) unless the disk that holds the folder, or will, has room for the files whose size is known; of an export that
 // goes on, those of them that it has written already are not counted again. Throws Error(usage) unless memory holds the box of
 // each sequence: a sparse file may have any, whose voxels many formats hold all.

@@ -144,56 +144,79 @@ double billows_of(const std::string& genus) {
     return 0.8;
 }
 
+// The voxels of a frame's files, before borders and levels: their largest is looked for when it is asked for, once. Takes
+// layout_bytes() then, which box_bytes() counts as long as nothing else was made of the frame.
+class FrameVoxels {
+  public:
+    FrameVoxels(const DensityGrid& density, int factor) : density_(density), factor_(factor) {}
+    // Returns the largest of the source: none of the means is larger.
+    float largest_cell() const { return density_.max_value(); }
+    float largest() {
+        if (factor_ == 1) return largest_cell();
+        if (!largest_) largest_ = std::ranges::max(lay_out(density_, VolumeLayout{.factor = factor_}).values);
+        return *largest_;
+    }
+
+  private:
+    const DensityGrid& density_;
+    int factor_;
+    std::optional<float> largest_;
+};
+
 // Throws Error(usage) where a value, or the mean of several, is beyond 16-bit floats, in which it would be infinite.
 void require_halves(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
-                    const DensityGrid& density) {
+                    FrameVoxels& voxels) {
     constexpr float kLargestHalf = 65504;
     for (const ExportFormat format : all_formats(options)) {
         const bool is_vdb = format == ExportFormat::vdb;
         const bool halves = is_vdb ? options.type == VoxelType::r16f
                                    : is_dense(format) && type_of(options, format) == VoxelType::r16f;
         const float most = kLargestHalf * (is_vdb ? 1 : s.scale);
-        if (!halves || !(density.max_value() > most)) continue;
-        const float largest = coarser(density, s.layout.factor).max_value();
-        if (!(largest > most)) continue;
+        if (!halves || !(voxels.largest_cell() > most) || !(voxels.largest() > most)) continue;
         throw Error(
             ErrorCode::usage,
             fmt::format("{}: its largest value{} is {:g}, and 16-bit floats end at {:g}: expected --type "
                         "r32f{}",
-                        frame.file.string(), s.layout.factor > 1 ? ", or mean," : "", largest, kLargestHalf,
-                        is_vdb ? "" : " or --range auto"));
+                        frame.file.string(), s.layout.factor > 1 ? ", or mean," : "", voxels.largest(),
+                        kLargestHalf, is_vdb ? "" : " or --range auto"));
     }
 }
 
 // Throws Error(usage) where values, or their means, are so small that the library, which divides codes by the range of a leaf, finds
 // infinity.
 void require_codes(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
-                   const DensityGrid& density) {
-    if (options.quantise == NanoQuantise::none || density.max_value() <= 0) return;
+                   FrameVoxels& voxels) {
+    if (options.quantise == NanoQuantise::none || voxels.largest_cell() <= 0) return;
     const auto codes = float(largest_code(options.quantise));
     // A leaf of a smaller range than codes / max float is lost in half of a code of the largest value.
     const float least = 2 * codes * codes / std::numeric_limits<float>::max();
     const double factor = s.layout.factor;
-    if (double(density.max_value()) / (factor * factor * factor) >= double(least)) return;
-    const float largest = coarser(density, s.layout.factor).max_value();
-    if (largest >= least) return;
+    if (double(voxels.largest_cell()) / (factor * factor * factor) >= double(least)) return;
+    if (voxels.largest() >= least) return;
     throw Error(
         ErrorCode::usage,
         fmt::format("{}: its largest value, or mean, is {:g}, and --quantise takes grids from {:g} on: "
                     "expected --quantise none",
-                    frame.file.string(), largest, least));
+                    frame.file.string(), voxels.largest(), least));
+}
+
+bool cuts_values(const ExportOptions& options) {
+    return std::ranges::any_of(all_formats(options), [&](ExportFormat format) {
+        const VoxelType type = type_of(options, format);
+        const bool codes = type == VoxelType::r8 || type == VoxelType::r16 || type == VoxelType::bc4;
+        return format == ExportFormat::flightgear || (is_dense(format) && codes);
+    });
 }
 
 // Returns "" unless values, or their means, are above the scale in a type that ends there.
 std::string cut_note(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
-                     const DensityGrid& density) {
-    if (!(density.max_value() > s.scale) || !cuts_values(options)) return {};
-    const float largest = coarser(density, s.layout.factor).max_value();
-    if (!(largest > s.scale)) return {};
+                     FrameVoxels& voxels) {
+    if (!(voxels.largest_cell() > s.scale) || !cuts_values(options) || !(voxels.largest() > s.scale))
+        return {};
     return fmt::format(
         "{}: values up to {:.9g} are above {:g}, and are cut in r8, r16, bc4 and flightgear "
         "(--range auto keeps them)",
-        frame.file.string(), largest, s.scale);
+        frame.file.string(), voxels.largest(), s.scale);
 }
 
 // Returns whether values above 0, of which none is above `largest`, are all 0 in a type.
@@ -220,8 +243,10 @@ ExportedFrame FrameExporter::write_files(const ExportSequence& s, const SourceFr
     if (!(loaded.density.extent() == s.extent) || !(loaded.density.placement() == s.placement))
         throw Error(ErrorCode::io,
                     frame.file.string() + ": has another box than the first file of its sequence");
-    require_halves(options_, s, frame, loaded.density);
-    require_codes(options_, s, frame, loaded.density);
+    FrameVoxels voxels(loaded.density, s.layout.factor);
+    require_halves(options_, s, frame, voxels);
+    require_codes(options_, s, frame, voxels);
+    std::string note_on_cut = cut_note(options_, s, frame, voxels);
     const ExportSource source{frame.file, file_digest(frame.file)};
     require_unchanged(frame);
     Encodings made;
@@ -248,8 +273,7 @@ ExportedFrame FrameExporter::write_files(const ExportSequence& s, const SourceFr
         };
         add(list_.write_file(name, source, name_of(format), write), false);
     }
-    if (std::string note = cut_note(options_, s, frame, loaded.density); !note.empty())
-        result.notes.push_back(std::move(note));
+    if (!note_on_cut.empty()) result.notes.push_back(std::move(note_on_cut));
     if (!lost.empty())
         result.notes.push_back(
             fmt::format("{}: nothing of it is left in {}: its values, of which none is above {:g}, or their "

@@ -76,10 +76,12 @@ std::optional<FileDigest> listed_digest(const RunListing& run, const ListedFrame
     return {};
 }
 
-// Looks again where a look fails. Throws ReadFailure where the system still cannot say.
+// Returns the stamp of a file; that of none for one that is gone. Looks again where a look fails. Throws ReadFailure where the
+// system still cannot say.
 FileStamp stamp_of(const std::filesystem::path& file) {
-    const FileStamp stamp = file_stamp(file);
-    return stamp == FileStamp{} && is_there(file) ? file_stamp(file) : stamp;
+    for (int look = 0; look < 2; ++look)
+        if (const FileStamp stamp = file_stamp(file); stamp != FileStamp{} || !is_there(file)) return stamp;
+    throw ReadFailure(file, "two looks at it failed", "examine");
 }
 
 void read_first(const ExportOptions& options, ExportSequence& s) {

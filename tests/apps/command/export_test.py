@@ -334,13 +334,13 @@ class Export(Case):
         self.call("export", "large.vdb", "--to", "raw", "--type", "r16f", "--range", "auto", "-o", "large")
         self.call("verify", "large")
 
-    def write_apart(self, side, edge_m=1.0):
+    def write_apart(self, side, edge_m=1.0, value=0.5):
         """apart.vdb: two voxels at opposite corners of a box."""
         import pyopenvdb
         grid = pyopenvdb.FloatGrid()
         grid.transform = pyopenvdb.createLinearTransform(edge_m)
         for place in ((0, 0, 0), (side - 1, side - 1, side - 1)):
-            grid.getAccessor().setValueOn(place, 0.5)
+            grid.getAccessor().setValueOn(place, value)
         grid.name = "density"
         pyopenvdb.write(str(self.folder / "apart.vdb"), [grid])
 
@@ -440,6 +440,14 @@ class Export(Case):
                 least += self.asked(text) + self.SLACK
                 status, text = self.limited(least, "verify", folder)
             self.assertEqual(status, 0, text)
+
+    @unittest.skipIf(SANITIZED, "a sanitizer takes most of the addresses")
+    def test_a_note_on_what_is_cut_needs_no_more(self):
+        """Means above the scale, which are looked for, beside the same voxels below it."""
+        for value, name in ((0.9, "low"), (100, "high")):
+            self.write_apart(512, value=value)
+            for more in (["--to", "raw", "--type", "r8"], ["--to", "raw", "--to", "vti", "--type", "r16", "--mips"]):
+                self.enough("export", "apart.vdb", *more, "--voxel", "2", "-o", name + more[-1], status=2)
 
     @unittest.skipIf(SANITIZED, "a sanitizer takes most of the addresses")
     def test_a_cloud_needs_what_is_asked_for(self):
@@ -1129,7 +1137,8 @@ class Export(Case):
         """Places, borders and ranges of bricks, colours of a picture: each changed in a file whose checksum is right."""
         import struct
         from PIL import Image
-        folder = self.export("out", "--to", "nvdb", "--to", "vti", "--to", "bricks", "--bricks", "8", "--mips", "--to", "flightgear")
+        folder = self.export("out", "--to", "nvdb", "--to", "vti", "--to", "bricks", "--bricks", "8", "--mips", "--to", "flightgear", "--to", "ktx2",
+                             "--to", "slices")
         size = json.loads((folder / "placed.volume.json").read_text())["voxel_size_m"][0]
 
         def changed(name, change, says):
@@ -1151,6 +1160,15 @@ class Export(Case):
         changed("placed_0003.nvdb", lambda file: file.replace(struct.pack("<d", size), struct.pack("<d", size * 2)), "contradict each other")
         changed("placed_0003.nvdb", lambda file: file.replace(struct.pack("<f", size), struct.pack("<f", size * 2)), "contradict each other")
         changed("placed_0003.nvdb", lambda file: file[:208] + file[208:].replace(b"density\0", b"densitx\0"), "its own checksum is of another head")
+        changed("placed_0003.nvdb", lambda file: (file[:208] + file[208:].replace(b"density\0", b"densitx\0"))[:208] + file[208:216] + b"\xff" * 8 +
+                file[224:], "its own checksum is of another head")
+        for at in (16 + 24, 16 + 48, 16 + 120, 16 + 156):  # voxels, box, edge and nodes in the file's head
+            changed("placed_0003.nvdb", lambda file, at=at: file[:at] + bytes([file[at] ^ 1]) + file[at + 1:], "its head is of another grid")
+        for end in (b" ", b" " * 400):
+            changed("placed_0003.nvdb", lambda file, end=end: file + end, "it states more or less bytes than it has")
+            for name in ("placed_0003.voxels.png", "placed_0003.png"):
+                changed(name, lambda file, end=end: file + end, "goes on behind its picture")
+            changed("placed_0003.ktx2", lambda file, end=end: file + end, "it does not end behind its levels")
         changed("placed_0003.vti", lambda file: file.replace(b'Direction="1 0', b'Direction="0 1'), "its head is not as nephos writes it")
         changed("placed_0003.vti", lambda file: file.replace(b"LittleEndian", b"BigEndian"), "its head is not as nephos writes it")
         changed("placed_0003.vti", lambda file: file + b" ", "it does not end behind its voxels")
@@ -1169,6 +1187,12 @@ class Export(Case):
         for channel, value in ((0, 9), (1, 77), (3, 254)):
             changed("placed_0003.voxels.png", recoloured(channel, value), "expected a picture that nephos has written")
         self.call("verify", "out")
+        folder = self.export("zip", "--to", "nvdb", "--zip")
+        whole = (folder / "placed_0003.nvdb").read_bytes()
+        for content in (whole[:-1] + bytes([whole[-1] ^ 1]), whole[:400] + bytes([whole[400] ^ 1]) + whole[401:]):
+            (folder / "placed_0003.nvdb").write_bytes(content)
+            self.relisted(folder, "placed_0003.nvdb")
+            self.assertIn("its compressed bytes are damaged", self.call("verify", folder, status=1).stdout)
         for out, edge_m in (("there", 2), ("here", 1)):
             self.write_apart(16, edge_m)
             self.call("export", "apart.vdb", "--to", "nvdb", "-o", out)

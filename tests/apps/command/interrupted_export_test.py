@@ -206,20 +206,27 @@ class InterruptedExport(Case):
     def test_verify_tells_a_lack_of_memory_from_damage(self):
         for name, more in (("flightgear", []), ("slices", []), ("vti", ["--zip"])):
             self.export(name, "--to", name, *more, "--frames", "3..3")
+            told = []
             for number in range(1, 60):
                 done = subprocess.run([NEPHOS, "verify", name, "-j", "1"], cwd=self.folder, capture_output=True, text=True, check=False,
                                       env={**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"allocate ENOMEM {number} 1"})
                 self.assertIn(done.returncode, (0, 3), done.stdout + done.stderr)
+                told += [done.stdout] * ("cannot compare with its source: out of memory" in done.stdout)
+            self.assertTrue(told, name)
 
     def test_verify_tells_a_look_that_fails_from_damage(self):
         for name in ("nvdb", "vdb"):
             self.export(name, "--to", name, "--frames", "3..3", "--voxel", "100")
+            told = []
             for number in range(1, 30):
                 done = subprocess.run([NEPHOS, "verify", name], cwd=self.folder, capture_output=True, text=True, check=False,
                                       env={**self.environment, "LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": f"stat EIO {number} 1", "FAIL_PATH": name + "/"})
                 self.assertIn(done.returncode, (0, 3), done.stdout + done.stderr)
+                told += [number] * (done.returncode == 3)
+            self.assertTrue(told, name)
 
     def test_a_look_that_fails_is_no_change(self):
+        told = []
         for number in range(1, 8):
             done = subprocess.run([NEPHOS, "export", "run", "--to", "raw", "--frames", "3..3", "-o", f"look{number}"], cwd=self.folder,
                                   capture_output=True, text=True, check=False,
@@ -227,6 +234,8 @@ class InterruptedExport(Case):
                                        "FAIL_PATH": "run/density/placed_0003"})
             self.assertIn(done.returncode, (0, 3), done.stderr)
             self.assertNotIn("was changed", done.stderr)
+            told += [number] * (done.returncode == 3)
+        self.assertTrue(told)
 
     def test_a_run_that_cannot_be_examined_is_still_one(self):
         """Nor does a plan need the folder that it is for."""
