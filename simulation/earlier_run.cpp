@@ -281,16 +281,17 @@ void refuse_to_remove_inputs(const RunFolder& folder, const std::vector<std::fil
 void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& settings) {
     const EarlierRun earlier = read_manifest(folder.manifest());
     if (!earlier.complete) {
+        const bool has_video = settings.render && wants_video(settings.scene);
         for (const std::filesystem::path& file : earlier_files(folder)) {
-            const bool is_place =
+            const bool is_video = has_video && file == folder.video();
+            const bool is_frame =
                 is_frame_place(folder, settings.scene, settings.range, settings.render, file);
-            if (is_place && !names_hash(file, earlier.frames_hash))
+            if ((is_frame || is_video) && !names_hash(file, earlier.frames_hash))
                 throw Error(
                     ErrorCode::usage,
-                    fmt::format(
-                        "{}: is of another run, or of none, and has the place of a frame of this one: "
-                        "move it away, or start anew with --overwrite",
-                        file.string()));
+                    fmt::format("{}: is of another run, or of none, and has the place of {} of this one: "
+                                "move it away, or start anew with --overwrite",
+                                file.string(), is_video ? "the video" : "a frame"));
         }
         return;
     }

@@ -52,9 +52,11 @@ bool is_frame_place(const RunFolder& folder, const Scene& scene, const Simulatio
 }
 
 bool names_hash(const std::filesystem::path& file, const std::string& hash) {
-    constexpr std::size_t kMostOfMetadata = 4096;
+    // A video has the places of all its pictures beside its metadata.
+    constexpr std::size_t kMostOfMetadata = 4096, kMostOfVideo = std::size_t(64) << 20;
     return type_behind(file) == std::filesystem::file_type::regular &&
-           read_beginning(file, kMostOfMetadata).find(hash) != std::string::npos;
+           read_beginning(file, file.extension() == ".mp4" ? kMostOfVideo : kMostOfMetadata).find(hash) !=
+               std::string::npos;
 }
 
 OwnFiles::OwnFiles(const std::filesystem::path& folder, EarlierRun run, const Scene& scene)
@@ -112,10 +114,12 @@ std::optional<std::string> OwnFiles::why_foreign(const std::filesystem::path& fi
         return std::nullopt;  // nothing is in it
     const auto listed = listed_.find(path);
     const auto table = std::ranges::find(run_.tables, path, &FileRecord::path);
-    const bool is_frame = is_frame_of(own->filename().string(), folder_.name);
+    // A video of a complete run that is not listed is of an earlier version, which left no hash in it.
+    const bool names_scene =
+        is_frame_of(own->filename().string(), folder_.name) || (*own == folder_.video() && !run_.complete);
     const bool is_right = listed != listed_.end()      ? has_content(*own, listed->second, true)
                           : table != run_.tables.end() ? has_content(*own, table->digest, false)
-                          : is_frame                   ? names_hash(*own, run_.frames_hash)
+                          : names_scene                ? names_hash(*own, run_.frames_hash)
                                                        : true;
     if (is_right) return std::nullopt;
     return fmt::format("{} is not what the run in it has written", path);

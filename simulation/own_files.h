@@ -25,14 +25,14 @@ bool is_frame_place(const RunFolder& folder, const Scene& scene, const Simulatio
                     const std::filesystem::path& file);
 
 // Returns whether a frame's file names such a hash in its metadata, which stands at its beginning in VDB, PNG
-// and EXR files alike: that of its scene (frames_hash()), or of the state of a density file. Throws
-// ReadFailure.
+// and EXR files alike, and ahead of the pictures in a video: that of its scene (frames_hash()), or of the state of a density
+// file. Throws ReadFailure.
 bool names_hash(const std::filesystem::path& file, const std::string& hash);
 
 // The files of a run, by whatever path through links they are reached:
 // - of a complete run those that its manifest lists, with the content that it wrote;
 // - of one that is not complete, and of the kinds that a manifest of an earlier version does not list, those
-//   at the places to which it writes; its frames name its scene, its tables begin as the manifest says, where
+//   at the places to which it writes; its frames and its video name its scene, its tables begin as the manifest says, where
 //   it says so.
 class OwnFiles {
   public:

@@ -284,7 +284,13 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     if (settings.statistics_only) settings.range = {settings.scene.steps, 1, 0};
     settings.render = settings.render && wants_pictures(settings.scene) && settings.range.has_frames();
     const RunFolder folder{settings.folder, settings.scene.name};
-    if (settings.render && wants_video(settings.scene)) require_ffmpeg();
+    if (settings.render && wants_video(settings.scene)) {
+        require_ffmpeg();
+        if (const double rate = settings.scene.frames.per_second; rate < kLeastVideoRate)
+            throw Error(
+                ErrorCode::usage,
+                fmt::format("`frames.per_second` is {:g}: a video has at least {:g}", rate, kLeastVideoRate));
+    }
     const bool may_resume = settings.resume;
     const auto found = [&] {
         return may_resume ? find_resumption(settings, folder) : Resumption::nothing_there;

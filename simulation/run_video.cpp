@@ -6,11 +6,19 @@
 #include <tbb/global_control.h>
 
 #include "core/error.h"
+#include "scenes/format/writer.h"
 
 namespace nephos {
+namespace {
+
+// Begins the comment by which a run knows its video (own_files.h).
+constexpr const char* kNamesScene = "nephos_scene_hash ";
+
+}  // namespace
 
 RunVideo::RunVideo(const RunSettings& settings, std::function<bool()> stop)
     : folder_{settings.folder, settings.scene.name},
+      frames_hash_(frames_hash(settings.scene)),
       frames_per_second_(settings.scene.frames.per_second),
       first_(settings.range.first_frame),
       next_(settings.range.first_frame),
@@ -26,6 +34,7 @@ void RunVideo::write(const Rgb8Image& image) {
         using Control = tbb::global_control;  // as many processors as threads of ours
         options.processors = int(Control::active_value(Control::max_allowed_parallelism));
         options.stop = stop_;
+        options.comment = kNamesScene + frames_hash_;
         writer_.emplace(folder_.video(), options);
     }
     writer_->add(image.rgb);

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "render/image/image_file.h"
 #include "render/image/video.h"
@@ -30,6 +31,7 @@ class RunVideo {
     void write(const Rgb8Image& image);
 
     RunFolder folder_;
+    std::string frames_hash_;
     double frames_per_second_ = 25;
     int first_ = 1, next_ = 1, last_ = 0;
     bool failed_ = false;  // in add()

@@ -108,7 +108,7 @@ Check replay_frames(const RunListing& run, int count) {
         const auto* errors = dynamic_cast<const SceneErrors*>(&error);
         const std::string text = errors != nullptr ? errors->problems().front().message : error.what();
         if (error.code() != ErrorCode::io) return {"replay", false, text};
-        return {"replay", false, "cannot be done: " + text, {}, false};
+        return {"replay", false, text, {}, false};
     }
     return sink.problems.check(
         "replay", fmt::format("{} frames simulated anew have the same states and voxels", sink.count));

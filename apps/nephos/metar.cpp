@@ -133,6 +133,8 @@ void write_scene(const MetarArguments& a, std::string_view text) {
 int metar(const MetarArguments& a) {
     if (a.overwrite && a.scene.empty() && !a.run)
         throw Error(ErrorCode::usage, "--overwrite requires --scene or --run");
+    if (a.explain && (a.run || !a.scene.empty()))
+        throw Error(ErrorCode::usage, "--explain only tells: leave out --scene and --run, or it");
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     const std::string text = report_of(a.report);
     if (a.report.starts_with('@')) refuse_to_replace(a.report.substr(1), a.scene);

@@ -7,12 +7,18 @@
 //     SIGTERM
 
 #include <algorithm>
+#include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <new>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <sys/types.h>
+#include <unistd.h>
 
 #include "apps/nephos/arguments.h"
 #include "apps/nephos/commands.h"
@@ -49,7 +55,10 @@ std::string suggestion(const CLI::App& app, const std::string& word) {
 }
 
 std::string explain(const CLI::App& app, const CLI::ParseError& error) {
-    const std::vector<std::string> words = app.remaining(true);
+    std::vector<std::string> words = app.remaining(true);
+    std::erase(words, "");
+    if (words.empty() && app.get_parent() != nullptr)
+        words = app.get_parent()->remaining(true);  // behind `--`
     // A command that is misspelt is to the parser one that is missing.
     const bool no_command = app.get_parent() == nullptr && !words.empty();
     if (no_command || dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
@@ -154,10 +163,42 @@ int guarded(int argc, const char* const* argv, const EditFunction& edit) {
     } catch (const std::filesystem::filesystem_error& error) {
         print_error(error.path1().string() + ": " + error.code().message());
         return kIo;
+    } catch (const std::system_error& error) {
+        const bool is_of_threads = error.code() == std::errc::resource_unavailable_try_again;
+        print_error(is_of_threads ? std::string("cannot start another thread: ") + error.code().message() +
+                                        ": expected a higher limit of processes (`ulimit -u`), or -j 1"
+                                  : std::string("unexpected: ") + error.what());
+        return kIo;
     } catch (const std::exception& error) {
         print_error(std::string("unexpected: ") + error.what());
         return kIo;
     }
+}
+
+pid_t program = 0;
+std::terminate_handler ends_otherwise = nullptr;
+
+// Tells a lack of memory or of threads, which libraries meet where no exception may leave them, in place of an abort: files are
+// whole or absent then, as after a signal. All else, and children of the program, end as they would.
+[[noreturn]] void end_and_tell() {
+    std::string_view told;
+    try {
+        if (std::current_exception()) throw;
+    } catch (const std::bad_alloc&) {
+        told = "error: out of memory\n";
+    } catch (const std::exception& error) {  // of TBB
+        if (std::string_view(error.what()).starts_with("pthread_create has failed"))
+            told =
+                "error: cannot start another thread: expected a higher limit of processes or addresses "
+                "(`ulimit -a`), or -j 1\n";
+    } catch (...) {
+    }
+    if (!told.empty() && ::getpid() == program) {
+        [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, told.data(), told.size());
+        ::_exit(kIo);
+    }
+    ends_otherwise();
+    std::abort();
 }
 
 }  // namespace
@@ -165,6 +206,8 @@ int guarded(int argc, const char* const* argv, const EditFunction& edit) {
 int run_program(int argc, const char* const* argv, const EditFunction& edit) {
     keep_freed_memory();
     install_signal_handlers();
+    program = ::getpid();
+    ends_otherwise = std::set_terminate(end_and_tell);
     return guarded(argc, argv, edit);
 }
 

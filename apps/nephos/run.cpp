@@ -277,8 +277,8 @@ int run(const RunArguments& a) {
     bar.reset();
     if (report.restarted && !a.work.quiet)
         print_note(report.folder.string() +
-                   ": the earlier run left no checkpoint to go on from, so it started anew "
-                   "(--checkpoint leaves one)");
+                   ": the earlier run left no checkpoint to go on from, so it started anew" +
+                   (a.statistics_only ? " (--checkpoint leaves one)" : ""));
     if (wants_frames && report.complete && report.frames == 0 && !a.work.quiet)
         print_note(
             fmt::format("these steps have no frame: frames.start_s and frames.count = {} lie elsewhere "

@@ -124,8 +124,8 @@ std::string describe(const SweepPlan& plan) {
                                          number_text(axis.from), number_text(axis.to))
                            : fmt::format("{}: {} values", fmt::join(axis.keys, "+"), axis.values.size()));
     const StepRules& steps = plan.options().steps;
-    return fmt::format("{} points ({}{}{}) x {} replicates = {} runs of {}{} steps",
-                       human_count(plan.points()), design_name(plan.options().design),
+    return fmt::format("{} {} ({}{}{}) x {} replicates = {} runs of {}{} steps", human_count(plan.points()),
+                       plan.points() == 1 ? "point" : "points", design_name(plan.options().design),
                        axes.empty() ? "" : "; ", fmt::join(axes, ", "), plan.options().replicates,
                        human_count(plan.runs()), steps.min,
                        steps.max > steps.min ? fmt::format(" to {}", steps.max) : "");
@@ -208,6 +208,9 @@ int sweep(const SweepArguments& a) {
     job.overwrite = a.overwrite;
     const std::string folder = job.folder.string();
     Output output;
+    if (a.emit && (a.dry_run || a.status))
+        throw Error(ErrorCode::usage,
+                    "--emit writes files, and --dry-run and --status only tell: give one of them");
     if (a.dry_run || a.status) {
         const SweepReport report = sweep_status(plan, job);
         const int status = report.problems.empty() ? 0 : int(ErrorCode::io);

@@ -218,8 +218,8 @@ void check(const VideoOptions& options) {
     };
     require(options.width >= 1 && options.width <= 16384, "width must be 1..16384 pixels");
     require(options.height >= 1 && options.height <= 16384, "height must be 1..16384 pixels");
-    require(options.frames_per_second > 0 && options.frames_per_second <= 1000,
-            "frames_per_second must be above 0 and at most 1000");
+    require(options.frames_per_second >= kLeastVideoRate && options.frames_per_second <= 1000,
+            "frames_per_second must be 0.001..1000");
     require(options.processors >= 0, "processors must be 0 or more");
     require(options.quality >= 0 && options.quality <= 51, "quality must be 0..51");
 }
@@ -239,8 +239,8 @@ std::vector<std::string> command_line(const VideoOptions& options) {
             "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p",
             "-c:v", "libx264", "-threads", kEncoderThreads, "-crf", std::to_string(options.quality),
             "-preset", "medium", "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc",
-            "iec61966-2-1", "-movflags", "+faststart", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-f",
-            "mp4", kOutputName};
+            "iec61966-2-1", "-movflags", "+faststart", "-fflags", "+bitexact", "-flags:v", "+bitexact",
+            "-metadata", "comment=" + options.comment, "-f", "mp4", kOutputName};
 }
 
 }  // namespace

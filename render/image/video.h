@@ -14,12 +14,16 @@ namespace nephos {
 
 struct VideoOptions {
     int width = 0, height = 0;      // pixels, 1..16384
-    double frames_per_second = 25;  // > 0, at most 1000
+    double frames_per_second = 25;  // kLeastVideoRate to 1000
     int quality = 18;               // constant rate factor of x264, 0 (lossless) .. 51
+    std::string comment = {};       // in its metadata, ahead of its pictures
     int processors = 0;             // on which ffmpeg may run, >= 0; 0: all. Without effect on the file
     // Asked often while ffmpeg is waited for, by the thread that waits; true ends ffmpeg, and the call with Error(io).
     std::function<bool()> stop = {};
 };
+
+// The least pictures a second: of fewer the container cannot hold the times.
+inline constexpr double kLeastVideoRate = 0.001;
 
 // Throws Error(io), with the package to install, when there is no ffmpeg command on the PATH. To be called
 // before a long run that ends with a video.

@@ -195,9 +195,9 @@ std::string start_of(int of_month, int hour, int minute, const MetarSceneOptions
     if (day.size() == 7) day += "-" + two(of_month);
     const std::string start = day + "T" + two(hour) + ":" + two(minute) + ":00Z";
     if (!utc_seconds(start) || (o.date.size() == 10 && o.date.substr(8) != two(of_month)))
-        throw Error(ErrorCode::usage, "--date '" + o.date + "' does not fit the report's day " +
-                                          std::to_string(of_month) +
-                                          ": expected a month such as 2024-06, or that day of one");
+        throw Error(ErrorCode::usage,
+                    "--date '" + o.date + "' does not fit the report's day " + std::to_string(of_month) +
+                        ": expected a month such as 2024-06, or that day of one, of the years 1900 to 2100");
     return start;
 }
 

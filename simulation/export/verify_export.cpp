@@ -164,7 +164,7 @@ bool is_at(const VtiPlace& found, const VolumeBox& box) {
 }
 
 EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
-                         const VolumeBox& box, int levels) {
+                         const VolumeBox& box, int levels, double time_s) {
     const auto& [nx, ny, nz] = box.size;
     // The file is read at once, and then its codes are made of it. What is compressed may have far more voxels than bytes, and
     // has them twice on the way; of the others a wrong box asks for no memory.
@@ -182,6 +182,7 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
         VtiPlace place;
         EncodedVolume volume = read_vti(path, &place);
         if (!is_at(place, box)) bad_file(path, kElsewhere);
+        if (place.time_s != time_s) bad_file(path, "is of another moment than its source");
         return volume;
     }
     return read_slices(path, nx, ny, nz, slice_columns(nx, ny, nz));
@@ -202,7 +203,8 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
                   const ListedExport::Sequence& s, const ExportedFile& file, Difference& d) {
     VdbReadOptions reading;
     reading.grid = list.grid;
-    const DensityGrid source = load_density(folder / file.source, reading).density;
+    const LoadedDensity of_source = load_density(folder / file.source, reading);
+    const DensityGrid& source = of_source.density;
     const std::filesystem::path path = folder / file.path;
     VolumeLayout plain;
     plain.factor = s.layout.factor;
@@ -255,7 +257,8 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     if (std::ranges::any_of(box.size, [](int side) { return side > kMostSide; }))
         bad_file(path, fmt::format("its list states a box of {} x {} x {} voxels", box.size[0], box.size[1],
                                    box.size[2]));
-    const EncodedVolume encoded = read_dense(path, file.format, type->second, box, s.levels);
+    const EncodedVolume encoded = read_dense(path, file.format, type->second, box, s.levels,
+                                             of_source.metadata ? of_source.metadata->time_s : 0);
     const VolumeLevel& top = encoded.levels.front();
     if (encoded.type != type->second || std::array{top.nx, top.ny, top.nz} != box.size)
         bad_file(path, "has another type or size than the list says");

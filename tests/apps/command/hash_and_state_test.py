@@ -86,6 +86,9 @@ class State(Case):
         self.call(*call, "--overwrite")
         self.assertEqual(scene.read_text(), made)
         self.refused(2, *call[:2], "--overwrite", says="--overwrite requires --scene or --run")
+        for more in (("-o", "new.toml"), ("--run",)):
+            self.refused(2, *call[:2], "--explain", *more, says="--explain only tells")
+        self.assertFalse((self.folder / "new.toml").exists())
 
     def test_state_goes_round(self):
         all_steps = self.hashes(self.scene, "--steps", "6").splitlines()

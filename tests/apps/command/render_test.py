@@ -13,7 +13,7 @@ import unittest
 
 from PIL import Image
 
-from case import Case, NEPHOS, SCENE, SOURCE
+from case import Case, NEPHOS, SCENE, SOURCE, unsealed
 
 
 class Vulkan(Case):
@@ -320,6 +320,44 @@ class Pictures(Case):
             self.call("run", self.scene, "--video", "--out", "out", "--resume", *change)
             self.call("run", self.scene, "--video", "--out", f"whole{steps}", *change)
             self.assertEqual(video.read_bytes(), (self.folder / f"whole{steps}/frames/tiny.mp4").read_bytes())
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_a_video_of_the_users_is_kept_by_a_run_that_goes_on(self):
+        """One that another program made of the frames so far: a run knows its own by what it names."""
+        broken = self.folder / "broken"
+        broken.mkdir()
+        (broken / "ffmpeg").write_text("#!/bin/sh\nexit 3\n")
+        (broken / "ffmpeg").chmod(0o700)
+        call = ("run", self.scene, "--video", "--splatting", "cpu", "--out", "out", "-q")
+        self.refused(3, *call, says="ffmpeg", env={"PATH": f"{broken}:{os.environ['PATH']}"})
+        video, manifest = self.folder / "out/frames/tiny.mp4", self.folder / "out/manifest.json"
+        checkpoint = self.folder / "out/checkpoint.nephos"
+        for content in (b"mine", b""):
+            video.write_bytes(content)
+            self.refused(2, *call, "--resume", says="tiny.mp4: is of another run, or of none, and has the place of the video of this one")
+            self.assertEqual(video.read_bytes(), content)
+        began = checkpoint.read_bytes()
+        checkpoint.unlink()  # as killed before the first
+        self.refused(2, *call, says="frames/tiny.mp4 is not what the run in it has written")
+        self.assertEqual(video.read_bytes(), b"")
+        checkpoint.write_bytes(began)
+        video.unlink()
+        self.call(*call, "--resume")
+        self.call("verify", "out")
+        own = video.read_bytes()
+        # Killed between the video and the manifest that says so: its own stays.
+        manifest.write_text(unsealed({**json.loads(manifest.read_text()), "complete": False}))
+        checkpoint.write_bytes(began)
+        written = video.stat().st_mtime_ns
+        self.call(*call, "--resume")
+        self.assertEqual((video.read_bytes(), video.stat().st_mtime_ns), (own, written))
+        self.call("verify", "out")
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_a_rate_that_no_video_has_is_refused_before_the_run(self):
+        self.refused(2, "run", self.scene, "--video", "--splatting", "cpu", "--out", "slow", "--set", "frames.per_second=1e-7",
+                     "--set", "frames.time_scale=1e-7", says="`frames.per_second` is 1e-07: a video has at least 0.001")
+        self.assertFalse((self.folder / "slow").exists())
 
 
 if __name__ == "__main__":

@@ -615,6 +615,8 @@ sd = 0.05
         self.refused(2, "sweep", "--quiet", self.null, *axis, "scripts", "--fail-fast", "--allow-failures", says="give one of them")
         for option in (["--retry-failed"], ["--fail-fast"], ["--allow-failures"], ["-j", "3"], ["--json"], ["--overwrite"]):
             self.refused(2, "sweep", self.null, *axis, "tasks", "--emit", "slurm", *option, says="--emit runs nothing")
+        for option in ("--dry-run", "--status"):
+            self.refused(2, "sweep", self.null, *axis, "tasks", "--emit", "slurm", option, says="--dry-run and --status only tell")
         # Beside records, too, whether complete or killed in the first runs.
         self.call("sweep", self.null, *axis, "mixed")
         shutil.copytree(self.folder / "mixed", self.folder / "killed")

@@ -16,6 +16,9 @@ from case import BAD, Case, NEPHOS, SCENE
 
 
 class Usage(Case):
+    def test_what_follows_two_dashes_is_named(self):
+        self.refused(2, "hash", self.scene, "--", "-n", "3", says="`-n`")
+
     def test_help_goes_to_stdout(self):
         for arguments in (["--help"], ["run", "--help"], ["render", "-h"], ["validate", "--help"], ["info", "--help"],
                           ["hash", "--help"], ["state", "--help"], ["completion", "--help"], ["sweep", "--help"],
