@@ -50,10 +50,13 @@ std::optional<std::filesystem::path> run_with_file(const std::filesystem::path& 
     std::error_code failure;
     const std::filesystem::path place = std::filesystem::canonical(file, failure);
     if (failure) throw ReadFailure(file, failure.message(), "examine");
-    const std::filesystem::path beside = place.parent_path();
-    for (const std::filesystem::path& folder : {beside, beside.parent_path()}) {
+    constexpr int kDeepest = 2;  // density/LAYER
+    std::filesystem::path folder = place;
+    for (int depth = 0; depth <= kDeepest; ++depth) {
+        folder = folder.parent_path();
         if (!is_run_folder(folder)) continue;
-        if (place == folder / "manifest.json") return folder;
+        const RunFolder run{folder, {}};
+        if (place == run.manifest() || place == run.checkpoint()) return folder;
         try {
             if (lists_file(read_run(folder), place)) return folder;
         } catch (const ReadFailure&) {

@@ -45,8 +45,8 @@ bool is_run_folder(const std::filesystem::path& folder);
 // a scene that cannot be read.
 RunListing read_run(const std::filesystem::path& folder);
 
-// Returns the folder of the run that lists the file, or whose manifest it is, links followed; nothing where neither its folder
-// nor the one above has a manifest that can be read. Throws ReadFailure where the system cannot say.
+// Returns the folder of the run that lists the file, or whose manifest or checkpoint it is, links followed; nothing where no folder
+// of a run that can be read is above it. Throws ReadFailure where the system cannot say.
 std::optional<std::filesystem::path> run_with_file(const std::filesystem::path& file);
 
 // Returns the path of the density file of a frame: of a layer, or of all together. Throws Error(usage) that lists the

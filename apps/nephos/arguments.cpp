@@ -15,6 +15,7 @@
 #include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/warnings.h"
+#include "simulation/export/export.h"
 #include "simulation/run_listing.h"
 
 namespace nephos {
@@ -209,10 +210,13 @@ void refuse_to_replace_files_of(Scene scene, const std::string& to) {
     });
 }
 
-void refuse_to_replace_file_of_run(const std::string& to) {
-    if (const auto run = run_with_file(to))
-        throw Error(ErrorCode::usage, to + ": is a file of the run in " + run->string() +
+void refuse_to_replace_listed_file(const std::string& to) {
+    const auto refuse = [&](const char* kind, const std::filesystem::path& folder) {
+        throw Error(ErrorCode::usage, to + ": is a file of the " + kind + " in " + folder.string() +
                                           ": expected the name of another one to write");
+    };
+    if (const auto run = run_with_file(to)) refuse("run", *run);
+    if (const auto exported = export_with_file(to)) refuse("export", *exported);
 }
 
 void print_scene_errors(const SceneErrors& errors) {

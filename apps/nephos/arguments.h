@@ -83,8 +83,8 @@ Scene load_scene(const SceneArguments& arguments, SceneUse use = SceneUse::every
 void refuse_to_replace(const std::string& from, const std::string& to);
 // The same for each file that a scene names.
 void refuse_to_replace_files_of(Scene scene, const std::string& to);
-// The same when a run lists it.
-void refuse_to_replace_file_of_run(const std::string& to);
+// The same when a run or an export lists it.
+void refuse_to_replace_listed_file(const std::string& to);
 
 // Prints every problem on standard error, "error:" in colour on a terminal.
 void print_scene_errors(const SceneErrors& errors);

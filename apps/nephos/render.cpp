@@ -186,7 +186,7 @@ int render(const RenderArguments& a) {
     for (const std::string& out : a.out) {
         refuse_to_replace(a.scene.file, out);
         if (scene) refuse_to_replace_files_of(*scene, out);
-        refuse_to_replace_file_of_run(out);
+        refuse_to_replace_listed_file(out);
     }
     const LoadedDensity loaded = load_density(a.file, a.read);
     constexpr double kLargestCell_m = 1e9;  // as of --scale; rays take a time that grows with it

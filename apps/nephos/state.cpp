@@ -62,7 +62,7 @@ int state(const StateArguments& a) {
     refuse_to_replace(a.scene.file, a.out);
     refuse_to_replace(a.from, a.out);
     refuse_to_replace_files_of(scene, a.out);
-    refuse_to_replace_file_of_run(a.out);
+    refuse_to_replace_listed_file(a.out);
     std::vector<LayerSimulation> layers = start_layers(scene, a.scene.file, a.from);
     const Automaton& automaton = *layers[chosen_layer(a, layers)].automaton();
     const std::uint64_t steps = a.steps.value_or(scene.steps);

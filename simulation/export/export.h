@@ -130,6 +130,10 @@ const std::vector<ExportPreset>& export_presets();
 // Returns true when the folder has a list of an export.
 bool is_export_folder(const std::filesystem::path& folder);
 
+// Returns the folder of the export that lists the file, or whose list it is, links followed; nothing where its folder has no list
+// that can be read. Throws ReadFailure where the system cannot say.
+std::optional<std::filesystem::path> export_with_file(const std::filesystem::path& file);
+
 // Checks the files of an export against its list, and the voxels of each against the source's within the error of
 // their type, where the source is still there. Throws Error(io) when the list cannot be read.
 Verification verify_export(const std::filesystem::path& folder, const VerifyOptions& options);

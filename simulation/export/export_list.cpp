@@ -149,6 +149,24 @@ bool is_export_folder(const std::filesystem::path& folder) {
     return type_behind(folder / "export.json") == std::filesystem::file_type::regular;
 }
 
+std::optional<std::filesystem::path> export_with_file(const std::filesystem::path& file) {
+    if (type_behind(file) != std::filesystem::file_type::regular) return {};
+    std::error_code failure;
+    const std::filesystem::path place = std::filesystem::canonical(file, failure);
+    if (failure) throw ReadFailure(file, failure.message(), "examine");
+    const std::filesystem::path folder = place.parent_path();
+    if (!is_export_folder(folder)) return {};
+    if (place == folder / "export.json") return folder;
+    try {
+        for (const ExportedFile& listed : read_export(folder).files)
+            if (is_same_place(folder / listed.path, place)) return folder;
+    } catch (const ReadFailure&) {
+        throw;
+    } catch (const Error&) {  // damaged, or of another version: then it lists nothing
+    }
+    return {};
+}
+
 ExportList::ExportList(const FolderLock& lock, const ExportOptions& options,
                        const std::vector<ExportSequence>& sequences)
     : lock_(lock), folder_(options.folder), work_(lock) {

@@ -164,7 +164,7 @@ bool is_at(const VtiPlace& found, const VolumeBox& box) {
 }
 
 EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
-                         const VolumeBox& box, int levels, double time_s) {
+                         const VolumeBox& box, int levels, std::optional<double> time_s) {
     const auto& [nx, ny, nz] = box.size;
     // The file is read at once, and then its codes are made of it. What is compressed may have far more voxels than bytes, and
     // has them twice on the way; of the others a wrong box asks for no memory.
@@ -182,7 +182,7 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
         VtiPlace place;
         EncodedVolume volume = read_vti(path, &place);
         if (!is_at(place, box)) bad_file(path, kElsewhere);
-        if (place.time_s != time_s) bad_file(path, "is of another moment than its source");
+        if (time_s && place.time_s != *time_s) bad_file(path, "is of another moment than its source");
         return volume;
     }
     return read_slices(path, nx, ny, nz, slice_columns(nx, ny, nz));
@@ -257,8 +257,9 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     if (std::ranges::any_of(box.size, [](int side) { return side > kMostSide; }))
         bad_file(path, fmt::format("its list states a box of {} x {} x {} voxels", box.size[0], box.size[1],
                                    box.size[2]));
-    const EncodedVolume encoded = read_dense(path, file.format, type->second, box, s.levels,
-                                             of_source.metadata ? of_source.metadata->time_s : 0);
+    const EncodedVolume encoded =
+        read_dense(path, file.format, type->second, box, s.levels,
+                   of_source.metadata ? std::optional(of_source.metadata->time_s) : std::nullopt);
     const VolumeLevel& top = encoded.levels.front();
     if (encoded.type != type->second || std::array{top.nx, top.ny, top.nz} != box.size)
         bad_file(path, "has another type or size than the list says");

@@ -1269,6 +1269,22 @@ class Export(Case):
                 self.assertIn("FAIL  sidecars  out/placed.volume.json: ", said)
                 self.assertIn(says, said)
 
+    def test_files_of_another_program_among_those_of_nephos(self):
+        """A frame that lost its metadata has the time of the first; and names of two formats may end alike."""
+        import pyopenvdb
+        names = []
+        for number in (1, 2, 3):
+            grids, metadata = pyopenvdb.readAll(str(self.folder / f"run/density/placed_{number:04}.vdb"))
+            for grid in grids if number == 2 else []:
+                for key in [key for key in grid.metadata if key.startswith("nephos")]:
+                    del grid[key]
+            names.append(f"m_{number}.vdb")
+            pyopenvdb.write(str(self.folder / names[-1]), grids, {} if number == 2 else metadata)
+        for n, order in enumerate((names, names[1:])):
+            self.call("export", *order, "--to", "vti", "--to", "slices", "--to", "flightgear", "-o", f"mixed{n}")
+            said = self.call("verify", f"mixed{n}").stdout
+            self.assertIn("times and figures of frames are those of list and sources", said)
+
     def test_voxels_that_are_no_numbers(self):
         """NaN in a file whose checksum agrees: compared with its source, it is none of its values."""
         for format, type, code, more in (("raw", "r32f", "<f4", []), ("raw", "r16f", "<f2", []), ("bricks", "r32f", "<f4", []),

@@ -6,7 +6,7 @@ import os
 import pathlib
 import unittest
 
-from case import Case, rows_of, SCENE, SOURCE, voxels
+from case import Case, LAYERED, rows_of, SCENE, SOURCE, voxels
 
 
 class Hash(Case):
@@ -59,11 +59,22 @@ class State(Case):
 
     def test_files_of_a_run_are_not_replaced(self):
         self.call("run", self.scene, "--no-render", "--out", "out", "-q")
+        self.call("run", self.write("layered.toml", LAYERED), "--no-render", "--out", "layers", "-q")
+        self.call("export", "out", "--to", "vdb", "--to", "slices", "-o", "exported", "-q")
         (self.folder / "link").symlink_to("out/density")
-        before = {path: path.read_bytes() for path in (self.folder / "out").rglob("*") if path.is_file()}
-        for file in ("out/density/tiny_0002.vdb", "link/tiny_0002.vdb", "out/manifest.json", "out/statistics.csv"):
-            self.refused(2, "state", self.scene, "--steps", "1", "--out", file, says=f"{file}: is a file of the run in ")
-        self.assertEqual({path: path.read_bytes() for path in (self.folder / "out").rglob("*") if path.is_file()}, before)
+        folders = ("out", "layers", "exported")
+        contents = lambda: {path: path.read_bytes() for name in folders for path in (self.folder / name).rglob("*") if path.is_file()}
+        before = contents()
+        report = "METAR LOWW 241250Z 30012KT 9999 FEW040 12/05 Q1020"
+        for file in ("out/density/tiny_0002.vdb", "link/tiny_0002.vdb", "out/manifest.json", "out/statistics.csv", "out/checkpoint.nephos",
+                     "layers/density/low/layered_0001.vdb", "exported/tiny_0002.vdb", "exported/export.json", "exported/tiny.volume.json"):
+            says = f"{file}: is a file of the {'export' if file.startswith('exported') else 'run'} in "
+            self.assertTrue((self.folder / file).is_file(), file)
+            self.refused(2, "state", self.scene, "--steps", "1", "--out", file, says=says)
+            self.refused(2, "metar", report, "-o", file, "--overwrite", says=says)
+        self.refused(2, "render", "out/density/tiny_0003.vdb", "--out", "exported/tiny_0002.png", "--splatting", "cpu",
+                     says="exported/tiny_0002.png: is a file of the export in ")
+        self.assertEqual(contents(), before)
         for _ in range(2):  # what the run does not list may be replaced
             self.call("state", self.scene, "--steps", "1", "--out", "out/density/state.vdb", "-q")
             self.call("render", "out/density/tiny_0003.vdb", "--out", "out/picture.png", "--splatting", "cpu", "--size", "32x24", "-q")
