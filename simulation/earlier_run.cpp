@@ -308,8 +308,8 @@ void refuse_to_replace_next_frames(const RunFolder& folder, const RunSettings& s
     for (const std::filesystem::path& file : earlier_files(folder))
         if (is_frame_place(folder, settings.scene, next, settings.render, file))
             refuse_file(file, "the next frame");
-    const bool makes_video = next.has_frames() && settings.render && wants_video(settings.scene);
-    if (makes_video && stands_there(folder.video()) &&
+    // With no further frame the video stays, and is listed anew.
+    if (settings.render && wants_video(settings.scene) && stands_there(folder.video()) &&
         OwnFiles(folder.folder, earlier, settings.scene).why_foreign(folder.video()))
         refuse_file(folder.video(), "the video");
 }

@@ -284,18 +284,16 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     if (settings.statistics_only) settings.range = {settings.scene.steps, 1, 0};
     settings.render = settings.render && wants_pictures(settings.scene) && settings.range.has_frames();
     const RunFolder folder{settings.folder, settings.scene.name};
-    if (settings.render && wants_video(settings.scene)) {
-        require_ffmpeg();
-        if (const double rate = settings.scene.frames.per_second; rate < kLeastVideoRate)
-            throw Error(
-                ErrorCode::usage,
-                fmt::format("`frames.per_second` is {:g}: a video has at least {:g}", rate, kLeastVideoRate));
-    }
+    if (settings.render && wants_video(settings.scene)) require_ffmpeg();
     const bool may_resume = settings.resume;
     const auto found = [&] {
         return may_resume ? find_resumption(settings, folder) : Resumption::nothing_there;
     };
     if (found() == Resumption::complete) return report_of_complete(settings, folder);
+    if (const double rate = settings.scene.frames.per_second;
+        settings.render && wants_video(settings.scene) && rate < kLeastVideoRate)
+        throw Error(ErrorCode::usage, fmt::format("`frames.per_second` is {:g}: a video has at least {:g}",
+                                                  rate, kLeastVideoRate));
     std::optional<Simulation> made;  // outlives the recorder, whose threads draw what is in it
     RunRecorder recorder(settings);  // opens the device
 

@@ -15,6 +15,7 @@
 #include "core/paths.h"
 #include "density/vdb/vdb_file.h"
 #include "density/voxel_digest.h"
+#include "scenes/format/writer.h"
 #include "simulation/branch.h"
 #include "simulation/earlier_run.h"
 #include "simulation/own_files.h"
@@ -194,8 +195,10 @@ void RunRecorder::start_video(const Simulation& simulation, std::function<bool()
     if (!settings_.render || !wants_video(settings_.scene)) return;
     std::error_code error;
     if (guard_) guard_();
-    if (simulation.next_frame() <= settings_.range.last_frame &&
-        !std::filesystem::remove(folder_.video(), error) && error)
+    // One of an earlier version does not name its scene, by which it is known while the run is not complete.
+    const bool is_to_be_made = simulation.next_frame() <= settings_.range.last_frame ||
+                               !names_hash(folder_.video(), frames_hash(settings_.scene));
+    if (is_to_be_made && !std::filesystem::remove(folder_.video(), error) && error)
         throw Error(ErrorCode::io, folder_.video().string() + ": cannot remove: " + error.message());
     if (!std::filesystem::exists(folder_.video())) output_.start_video(std::move(stop));
 }

@@ -199,7 +199,8 @@ void add_shape_options(CLI::App& command, const std::shared_ptr<ExportArguments>
     add_value(command, "--size", "N",
               "Coarser voxels, so that the longest side has at most N, border and padding included",
               [&o](const std::string& text) { o.largest_side = int(parse_integer(text, 1, 1 << 20)); });
-    add_value(command, "--budget", "BYTES", "Coarser voxels, so that a frame takes at most this: 64MiB",
+    add_value(command, "--budget", "BYTES",
+              "Coarser voxels, so that those of a frame take at most this: 64MiB",
               [&o](const std::string& text) { o.budget_bytes = parse_bytes(text); });
     command.add_flag(
         "--mips", o.mips,

@@ -56,9 +56,8 @@ std::string suggestion(const CLI::App& app, const std::string& word) {
 
 std::string explain(const CLI::App& app, const CLI::ParseError& error) {
     std::vector<std::string> words = app.remaining(true);
-    std::erase(words, "");
-    if (words.empty() && app.get_parent() != nullptr)
-        words = app.get_parent()->remaining(true);  // behind `--`
+    if (words.empty() && app.get_parent() != nullptr) words = app.get_parent()->remaining(false);
+    std::erase(words, "--");  // behind which they may stand
     // A command that is misspelt is to the parser one that is missing.
     const bool no_command = app.get_parent() == nullptr && !words.empty();
     if (no_command || dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
@@ -143,6 +142,17 @@ int run_command(CLI::App& app, int argc, const char* const* argv, const EditFunc
     return action();
 }
 
+constexpr std::string_view kNoThread =
+    "cannot start another thread: expected a higher limit of processes or addresses (`ulimit -a`), or fewer "
+    "threads (-j 1)";
+
+// Tells the exceptions of the standard library and of TBB.
+bool is_lack_of_threads(const std::exception& error) {
+    const auto* of_system = dynamic_cast<const std::system_error*>(&error);
+    return (of_system != nullptr && of_system->code() == std::errc::resource_unavailable_try_again) ||
+           std::string_view(error.what()).starts_with("pthread_create has failed");
+}
+
 // The only place where exceptions end.
 int guarded(int argc, const char* const* argv, const EditFunction& edit) {
     CLI::App app;
@@ -163,14 +173,9 @@ int guarded(int argc, const char* const* argv, const EditFunction& edit) {
     } catch (const std::filesystem::filesystem_error& error) {
         print_error(error.path1().string() + ": " + error.code().message());
         return kIo;
-    } catch (const std::system_error& error) {
-        const bool is_of_threads = error.code() == std::errc::resource_unavailable_try_again;
-        print_error(is_of_threads ? std::string("cannot start another thread: ") + error.code().message() +
-                                        ": expected a higher limit of processes (`ulimit -u`), or -j 1"
-                                  : std::string("unexpected: ") + error.what());
-        return kIo;
     } catch (const std::exception& error) {
-        print_error(std::string("unexpected: ") + error.what());
+        print_error(is_lack_of_threads(error) ? std::string(kNoThread)
+                                              : std::string("unexpected: ") + error.what());
         return kIo;
     }
 }
@@ -185,16 +190,14 @@ std::terminate_handler ends_otherwise = nullptr;
     try {
         if (std::current_exception()) throw;
     } catch (const std::bad_alloc&) {
-        told = "error: out of memory\n";
-    } catch (const std::exception& error) {  // of TBB
-        if (std::string_view(error.what()).starts_with("pthread_create has failed"))
-            told =
-                "error: cannot start another thread: expected a higher limit of processes or addresses "
-                "(`ulimit -a`), or -j 1\n";
+        told = "out of memory";
+    } catch (const std::exception& error) {
+        if (is_lack_of_threads(error)) told = kNoThread;
     } catch (...) {
     }
     if (!told.empty() && ::getpid() == program) {
-        [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, told.data(), told.size());
+        for (const std::string_view part : {std::string_view("error: "), told, std::string_view("\n")})
+            [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, part.data(), part.size());
         ::_exit(kIo);
     }
     ends_otherwise();

@@ -153,18 +153,30 @@ void send_tiles(SandboxWriter& writer, const CoordBBox& extent, const openvdb::C
             for (int x = box.min().x(); x <= box.max().x(); x += kBlock) send_tile(writer, {x, y, z}, value);
 }
 
+// Throws unless so many bytes at a place, to which offsets of the file lead, are of the grid's.
+void require_within(const nanovdb::GridHandle<>& grid, const void* place, std::uint64_t bytes) {
+    const auto begin = reinterpret_cast<std::uintptr_t>(grid.data()),
+               at = reinterpret_cast<std::uintptr_t>(place);
+    if (at < begin || at - begin > grid.size() || bytes > grid.size() - (at - begin))
+        throw std::runtime_error("its nodes lie outside of it");
+}
+
 // Sends the blocks below a node. (The library's conversion to OpenVDB would do, but for its threads: a child that was forked
 // should start none.)
 template <class Node>
-void send_node(SandboxWriter& writer, const CoordBBox& extent, const Node& node) {
+void send_node(SandboxWriter& writer, const nanovdb::GridHandle<>& grid, const CoordBBox& extent,
+               const Node& node) {
+    require_within(grid, &node, sizeof node);
     if constexpr (Node::LEVEL == 0) {
         std::array<float, kBlockVoxels> values;
         for (std::uint32_t n = 0; n < kBlockVoxels; ++n) values[n] = node.getValue(n);
+        if (!std::ranges::all_of(values, [](float value) { return value >= 0 && std::isfinite(value); }))
+            throw std::runtime_error("it holds a value that is no density");
         for (auto active = node.valueMask().beginOn(); active; ++active)
             require_inside(extent, CoordBBox::createCube(coordinates(node.offsetToGlobalCoord(*active)), 1));
         send_leaf(writer, coordinates(node.origin()), values.data());
     } else {
-        for (auto child = node.beginChild(); child; ++child) send_node(writer, extent, *child);
+        for (auto child = node.beginChild(); child; ++child) send_node(writer, grid, extent, *child);
         constexpr int kEdge = int(Node::ChildNodeType::DIM);
         for (auto tile = node.beginValueOn(); tile; ++tile)
             send_tiles(writer, extent, coordinates(node.offsetToGlobalCoord(tile.pos())), kEdge, *tile);
@@ -228,7 +240,8 @@ ReadGrid read_grid(std::istream& stream) {
     if (meta.nameSize == 0 || meta.nameSize > file.left()) throw std::runtime_error("it ends early");
     meta.gridName.resize(meta.nameSize);
     file.read(meta.gridName.data(), meta.nameSize);
-    meta.gridName.pop_back();  // its end
+    if (meta.gridName.back() != '\0') throw std::runtime_error("its grid's name has no end");
+    meta.gridName.pop_back();
     const bool is_packed = header.codec == nanovdb::io::Codec::ZIP;
     if (!is_packed && header.codec != nanovdb::io::Codec::NONE)
         throw std::runtime_error("it is compressed by other means than zlib");
@@ -268,18 +281,22 @@ void require_one_grid(const nanovdb::GridHandle<>& handle) {
     if (handle.size() < sizeof(nanovdb::GridData) || grid->gridIndex() != 0 || grid->gridCount() != 1 ||
         grid->gridSize() != handle.size())
         throw std::runtime_error("it holds no single whole grid");
+    if (!grid->isValid()) throw std::runtime_error("its grid does not begin as one");
 }
 
 template <class Build>
 bool send_grid_of(const ReadGrid& read, const CoordBBox& extent, SandboxWriter& writer) {
     const nanovdb::NanoGrid<Build>* grid = read.grid.grid<Build>();
     if (grid == nullptr) return false;
+    require_within(read.grid, &grid->tree(), sizeof grid->tree());
+    require_within(read.grid, &grid->tree().root(), sizeof grid->tree().root());
+    require_within(read.grid, &grid->tree().root(), grid->tree().root().memUsage());
     // Partial: of its head, for which the library starts no threads.
     if (nanovdb::checksum(*grid, nanovdb::ChecksumMode::Partial) != grid->checksum())
         throw std::runtime_error("its own checksum is of another head");
     require_head_of(read);
     const auto& root = grid->tree().root();
-    for (auto child = root.beginChild(); child; ++child) send_node(writer, extent, *child);
+    for (auto child = root.beginChild(); child; ++child) send_node(writer, read.grid, extent, *child);
     for (auto tile = root.beginValueOn(); tile; ++tile) {
         const openvdb::Coord origin = coordinates(root.data()->tile(tile.pos())->origin());
         send_tiles(writer, extent, origin, int(nanovdb::NanoUpper<Build>::DIM), *tile);

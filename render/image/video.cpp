@@ -219,7 +219,7 @@ void check(const VideoOptions& options) {
     require(options.width >= 1 && options.width <= 16384, "width must be 1..16384 pixels");
     require(options.height >= 1 && options.height <= 16384, "height must be 1..16384 pixels");
     require(options.frames_per_second >= kLeastVideoRate && options.frames_per_second <= 1000,
-            "frames_per_second must be 0.001..1000");
+            "frames_per_second must be 0.00005..1000");
     require(options.processors >= 0, "processors must be 0 or more");
     require(options.quality >= 0 && options.quality <= 51, "quality must be 0..51");
 }

@@ -22,8 +22,8 @@ struct VideoOptions {
     std::function<bool()> stop = {};
 };
 
-// The least pictures a second: of fewer the container cannot hold the times.
-inline constexpr double kLeastVideoRate = 0.001;
+// The least pictures a second: ffmpeg fails with fewer, whose times its MP4 cannot hold.
+inline constexpr double kLeastVideoRate = 0.00005;
 
 // Throws Error(io), with the package to install, when there is no ffmpeg command on the PATH. To be called
 // before a long run that ends with a video.

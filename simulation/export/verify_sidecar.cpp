@@ -2,6 +2,7 @@
 // Sidecars of an export against its list.
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <new>
 #include <span>
@@ -91,14 +92,49 @@ void check_values(const CheckedJson& json, const nlohmann::ordered_json& parsed,
     }
 }
 
+// Compares the values of objects below a key, which both must have or lack.
+void check_object(const CheckedJson& json, const nlohmann::ordered_json& parsed,
+                  const nlohmann::ordered_json& expected, std::string_view key,
+                  std::span<const std::string_view> keys) {
+    if (!expected.contains(key)) {
+        if (json.has(key)) json.at(key).fail("no such value");
+        return;
+    }
+    const CheckedJson value = json.at(key);
+    if (value.members().empty()) value.fail("an object of " + std::string(key));
+    check_values(value, parsed.at(key), expected.at(key), keys);
+}
+
+// Compares the matrix of a place but for rounding: its sines are not those of every version.
+void check_matrix(const CheckedJson& matrix, const nlohmann::ordered_json& expected) {
+    const std::vector<CheckedJson> found = matrix.items();
+    if (found.size() != expected.size()) matrix.fail(fmt::format("{} numbers", expected.size()));
+    for (std::size_t n = 0; n < found.size(); ++n) {
+        const auto number = expected.at(n).get<double>();
+        const double error = 1e-12 * std::max(1.0, std::abs(number));
+        if (!(std::abs(found[n].real(-1e15, 1e15) - number) <= error))
+            found[n].fail(expected.at(n).dump() + ", as its source has it");
+    }
+}
+
 // Compares what the list and the source of the first frame decide: all that places the voxels of a file.
 void check_box(const CheckedJson& json, const nlohmann::ordered_json& parsed,
                const nlohmann::ordered_json& expected) {
     constexpr std::string_view kKeys[] = {
-        "layer",    "quantity", "offset",     "extinction_per_m", "size",         "order",  "axes",
-        "unit",     "max_m",    "handedness", "voxel_size_m",     "min_m",        "sample", "border",
-        "period_m", "padding",  "time",       "half_voxel_shift", "georeference", "source"};
+        "layer",    "quantity", "offset",          "extinction_per_m", "size",  "order",  "axes",
+        "unit",     "max_m",    "handedness",      "voxel_size_m",     "min_m", "sample", "border",
+        "period_m", "padding",  "half_voxel_shift"};
+    constexpr std::string_view kTimes[] = {"first_s", "frames_per_second", "time_scale"},
+                               kPlace[] = {"latitude_deg",   "longitude_deg", "height_m",   "height_datum",
+                                           "geoid_height_m", "heading_deg",   "projection", "start_utc"},
+                               kSource[] = {"scene_hash", "seed", "nephos_version"};
     check_values(json, parsed, expected, kKeys);
+    check_object(json, parsed, expected, "time", kTimes);
+    check_object(json, parsed, expected, "source", kSource);
+    check_object(json, parsed, expected, "georeference", kPlace);
+    if (expected.contains("georeference"))
+        check_matrix(json.at("georeference").at("ecef_from_world"),
+                     expected.at("georeference").at("ecef_from_world"));
     const std::vector<CheckedJson> formats = json.at("formats").items();
     if (formats.size() != expected.at("formats").size())
         json.at("formats").fail(fmt::format("{} formats, as in export.json", expected.at("formats").size()));

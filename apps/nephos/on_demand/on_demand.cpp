@@ -14,7 +14,6 @@
 #include <pthread.h>
 #include <sys/auxv.h>
 #include <sys/mman.h>
-#include <tbb/global_control.h>
 
 #include "core/error.h"
 
@@ -43,42 +42,31 @@ void* wait_for_unlock(void* lock) {
     return nullptr;
 }
 
-// A library of OpenVDB's, liblog4cplus, starts four threads while it is loaded, a run two that draw and write, and TBB as many as
-// are allowed. Where the limits of a user or of memory allow fewer, they end the process or wait for ever: so as many are tried
-// first, with the addresses that the libraries take (70 MiB with Debian 12). Throws Error(io).
+// A library of OpenVDB's, liblog4cplus, starts four threads while it is loaded, and TBB two at least at its first work. Where
+// the limits of a user or of memory allow fewer, they end the process or wait for ever: so as many are tried first, with
+// the addresses that the libraries take (70 MiB with Debian 12). Throws Error(io).
 void require_room() {
-    constexpr std::size_t kAddresses = std::size_t(80) << 20, kThreads = 6,
-                          kStackOfTbb = std::size_t(4) << 20;
-    const std::size_t of_tbb =
-        tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-    const std::size_t wanted = kThreads + (of_tbb > 1 ? of_tbb : 0);
+    constexpr std::size_t kAddresses = std::size_t(80) << 20, kThreads = 6;
     void* const addresses =
         ::mmap(nullptr, kAddresses, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     int problem = addresses == MAP_FAILED ? errno : 0;
-    pthread_attr_t small;
-    pthread_attr_init(&small);
-    pthread_attr_setstacksize(&small, kStackOfTbb);
     pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
     pthread_mutex_lock(&lock);
     std::vector<pthread_t> threads;
-    threads.reserve(wanted);
-    while (problem == 0 && threads.size() < wanted) {
+    threads.reserve(kThreads);
+    while (problem == 0 && threads.size() < kThreads) {
         pthread_t thread{};
-        problem =
-            pthread_create(&thread, threads.size() < kThreads ? nullptr : &small, wait_for_unlock, &lock);
+        problem = pthread_create(&thread, nullptr, wait_for_unlock, &lock);
         if (problem == 0) threads.push_back(thread);
     }
     pthread_mutex_unlock(&lock);
     for (const pthread_t thread : threads) pthread_join(thread, nullptr);
     pthread_mutex_destroy(&lock);
-    pthread_attr_destroy(&small);
     if (addresses != MAP_FAILED) ::munmap(addresses, kAddresses);
     if (problem != 0)
         throw Error(ErrorCode::io, std::string("a part of nephos cannot be loaded: it needs ") +
-                                       std::to_string(wanted) + " threads" +
-                                       (wanted > kThreads ? " (fewer with -j 1)" : "") +
-                                       " and 80 MiB of addresses: " + std::strerror(problem) +
-                                       " (see the limits of `ulimit -a`)");
+                                       std::to_string(kThreads) + " threads and 80 MiB of addresses: " +
+                                       std::strerror(problem) + " (see the limits of `ulimit -a`)");
 }
 
 // RTLD_NOW, because files are read in processes that may open nothing, so no symbol may be looked up there.

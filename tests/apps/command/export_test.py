@@ -1164,6 +1164,13 @@ class Export(Case):
                 file[224:], "its own checksum is of another head")
         for at in (16 + 24, 16 + 48, 16 + 120, 16 + 156):  # voxels, box, edge and nodes in the file's head
             changed("placed_0003.nvdb", lambda file, at=at: file[:at] + bytes([file[at] ^ 1]) + file[at + 1:], "its head is of another grid")
+        whole = (folder / "placed_0003.nvdb").read_bytes()
+        tree = 200 + 672  # behind file's head and grid's
+        for at in (*range(tree + 24, tree + 32), *range(tree + 64 + 24, tree + 64 + 28)):  # where the root is, and how many tiles it has
+            for bit in (1, 0x80):
+                changed("placed_0003.nvdb", lambda file, at=at, bit=bit: file[:at] + bytes([file[at] ^ bit]) + file[at + 1:], "or is damaged: ")
+        changed("placed_0003.nvdb", lambda file: file[:199] + b"x" + file[200:], "its grid's name has no end")
+        changed("placed_0003.nvdb", lambda file: file[:205] + b"x" + file[206:], "its grid does not begin as one")
         for end in (b" ", b" " * 400):
             changed("placed_0003.nvdb", lambda file, end=end: file + end, "it states more or less bytes than it has")
             for name in ("placed_0003.voxels.png", "placed_0003.png"):
@@ -1238,6 +1245,9 @@ class Export(Case):
             return dict(whole, formats=[dict(whole["formats"][0], **values)])
         def with_frame(n, **values):
             return dict(whole, frames=[dict(frame, **values) if m == n else frame for m, frame in enumerate(whole["frames"])])
+        def turned(by):
+            matrix = whole["georeference"]["ecef_from_world"]
+            return dict(whole, georeference=dict(whole["georeference"], ecef_from_world=[matrix[0] + by, *matrix[1:]]))
         levels = whole["formats"][0]["levels"]
         self.assertGreater(len(levels), 1)
         for sidecar, says in ((without("scale"), "`scale` is missing"), (dict(whole, scale="1"), '`scale` is "1": expected a number'),
@@ -1258,9 +1268,10 @@ class Export(Case):
                               (with_frame(2, sum=whole["frames"][2]["sum"] * 1.000001), "`frames[2].sum` is"),
                               (with_frame(3, max=whole["frames"][2]["max"]), "`frames[3].max` is"), (with_frame(4, time_s=0), "`frames[4].time_s` is 0"),
                               (with_frame(1, utc=whole["frames"][2]["utc"]), "`frames[1].utc` is"), (dict(whole, layer="low"), "no such value"),
-                              (dict(whole, time=dict(whole["time"], first_s=5)), "`time` is"), (without("georeference"), "`georeference` is missing"),
-                              (dict(whole, georeference=dict(whole["georeference"], heading_deg=4)), "`georeference` is"),
-                              (dict(whole, source=dict(whole["source"], seed="8")), "`source` is"),
+                              (dict(whole, time=dict(whole["time"], first_s=5)), "`time.first_s` is 5"), (without("georeference"), "`georeference` is missing"),
+                              (dict(whole, georeference=dict(whole["georeference"], heading_deg=4)), "`georeference.heading_deg` is 4"),
+                              (turned(1e-6), "`georeference.ecef_from_world[0]` is"),
+                              (dict(whole, source=dict(whole["source"], seed="8")), '`source.seed` is "8"'),
                               (with_format(levels=[dict(levels[0], offset=4), *levels[1:]]), "`formats[0].levels` is")):
             with self.subTest(says=says):
                 (folder / "placed.volume.json").write_text(json.dumps(sidecar))
@@ -1268,6 +1279,9 @@ class Export(Case):
                 said = self.call("verify", "out", status=1).stdout
                 self.assertIn("FAIL  sidecars  out/placed.volume.json: ", said)
                 self.assertIn(says, said)
+        (folder / "placed.volume.json").write_text(json.dumps(turned(1e-16)))  # as other sines round
+        self.relisted(folder, "placed.volume.json")
+        self.call("verify", "out")
 
     def test_files_of_another_program_among_those_of_nephos(self):
         """A frame that lost its metadata has the time of the first; and names of two formats may end alike."""

@@ -345,6 +345,12 @@ class Pictures(Case):
         self.call(*call, "--resume")
         self.call("verify", "out")
         own = video.read_bytes()
+        # One that is put into a complete run is not listed by one that goes on without a frame.
+        video.write_bytes(b"mine")
+        longer = ("--set", "time.steps=7")
+        self.refused(2, *call, "--resume", *longer, says="tiny.mp4: would be replaced by the video of the run, which has not written it")
+        self.assertEqual(video.read_bytes(), b"mine")
+        video.write_bytes(own)
         # Killed between the video and the manifest that says so: its own stays.
         manifest.write_text(unsealed({**json.loads(manifest.read_text()), "complete": False}))
         checkpoint.write_bytes(began)
@@ -356,7 +362,7 @@ class Pictures(Case):
     @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
     def test_a_rate_that_no_video_has_is_refused_before_the_run(self):
         self.refused(2, "run", self.scene, "--video", "--splatting", "cpu", "--out", "slow", "--set", "frames.per_second=1e-7",
-                     "--set", "frames.time_scale=1e-7", says="`frames.per_second` is 1e-07: a video has at least 0.001")
+                     "--set", "frames.time_scale=1e-7", says="`frames.per_second` is 1e-07: a video has at least 5e-05")
         self.assertFalse((self.folder / "slow").exists())
 
 

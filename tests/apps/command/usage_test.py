@@ -17,7 +17,9 @@ from case import BAD, Case, NEPHOS, SCENE
 
 class Usage(Case):
     def test_what_follows_two_dashes_is_named(self):
-        self.refused(2, "hash", self.scene, "--", "-n", "3", says="`-n`")
+        for arguments, says in ((["hash", self.scene, "--", "-n", "3"], "`-n`"), (["hash", "--", self.scene, "extra"], "`extra`"), (["--", "hahs"], "`hahs`"),
+                                (["hash", self.scene, ""], "unexpected argument ``")):
+            self.refused(2, *arguments, says=says)
 
     def test_help_goes_to_stdout(self):
         for arguments in (["--help"], ["run", "--help"], ["render", "-h"], ["validate", "--help"], ["info", "--help"],
