@@ -311,6 +311,11 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                                 SourceFrame& frame = s.frames[index];
                                 take_moment(loaded, frame);
                                 if (loaded.metadata) winds.add(frame.time_s, loaded.metadata->wind);
+                                if (s.of_nephos && !loaded.metadata)
+                                    notes.push_back(
+                                        fmt::format("{}: says of no moment, unlike the first file: it is "
+                                                    "given that one's, {:g} s",
+                                                    frame.file.string(), frame.time_s));
                                 for (const std::string& note : loaded.notes)
                                     notes.push_back(frame.file.string() + ": " + note);
                                 work.add([&, read] {
