@@ -120,4 +120,12 @@ std::filesystem::path normal_path(const std::filesystem::path& path) {
     return is_folder ? whole : whole / name;
 }
 
+std::vector<std::filesystem::path> folders_of(const std::filesystem::path& file) {
+    std::error_code failure;
+    const std::filesystem::path by_path = std::filesystem::absolute(file, failure),
+                                resolved = std::filesystem::canonical(file, failure);
+    if (failure) throw ReadFailure(file, failure.message(), "examine");
+    return {normal_path(by_path).parent_path(), resolved.parent_path()};
+}
+
 }  // namespace nephos

@@ -44,4 +44,7 @@ std::vector<std::string> names_in_folder(const std::filesystem::path& folder);
 // ".." goes back through a link, with the links of its folder resolved. Where nothing is there it is by its text.
 std::filesystem::path normal_path(const std::filesystem::path& path);
 
+// Returns the folders that hold a file: by its path, and with all links resolved. Throws ReadFailure where nothing is there.
+std::vector<std::filesystem::path> folders_of(const std::filesystem::path& file);
+
 }  // namespace nephos

@@ -5,6 +5,8 @@
 
 #include <tbb/global_control.h>
 
+#include "simulation/scene_files.h"
+
 namespace nephos {
 namespace {
 
@@ -14,14 +16,20 @@ bool several_threads() {
 
 }  // namespace
 
-FrameOutput::FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&, std::vector<WrittenFile>)> done)
+FrameOutput::FrameOutput(const RunSettings& settings,
+                         std::function<void(const FrameResult&, std::vector<WrittenFile>)> done)
     : settings_(settings),
       done_(std::move(done)),
       writer_(settings.scene, {settings.folder, settings.scene.name}, settings.range.first_frame),
       painter_(settings.render ? std::make_unique<FramePainter>(settings.scene, settings.device) : nullptr),
       writing_(kFramesWritten, several_threads(), [this](Drawn& drawn) { write(drawn); }),
       drawing_(kFramesDrawn, several_threads() && settings.render,
-               [this](FrameResult& frame) { draw_next(frame); }) {}
+               [this](FrameResult& frame) { draw_next(frame); }) {
+    // Before the run takes the folder of another one.
+    if (painter_)
+        require_cameras_above(settings.scene, painter_->terrain(), settings.range.first_frame,
+                              settings.range.last_frame);
+}
 
 std::string FrameOutput::backend_name() const { return painter_ ? painter_->backend_name() : ""; }
 

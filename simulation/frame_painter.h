@@ -66,6 +66,9 @@ class FramePainter {
     // may call it while another draws.
     Camera camera(double time_s) const { return painter_.camera(scene_.render, time_s); }
 
+    // Returns the ground that is not level; null: it is.
+    const HeightMap* terrain() const { return painter_.terrain().get(); }
+
     const Renderer& renderer() const { return renderer_; }
     // Return what Renderer's do. They never change: any thread may call these three while another draws.
     std::string backend_name() const { return renderer_.backend_name(); }

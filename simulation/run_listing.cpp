@@ -2,7 +2,7 @@
 #include "simulation/run_listing.h"
 
 #include <algorithm>
-#include <system_error>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -11,6 +11,7 @@
 #include "core/paths.h"
 #include "scenes/format/reader.h"
 #include "simulation/checked_json.h"
+#include "simulation/own_files.h"
 
 namespace nephos {
 namespace {
@@ -30,13 +31,16 @@ ListedFrame frame_of(const Json& json, const std::filesystem::path& manifest) {
     return frame;
 }
 
-bool lists_file(const RunListing& run, const std::filesystem::path& file) {
+// Returns whether the run lists the file, or, while it is not complete, has made it and not listed it yet.
+bool is_of_run(const RunListing& run, const std::filesystem::path& file) {
     const auto is_file = [&](const FileRecord& record) {
         return is_same_place(run.folder / record.path, file);
     };
     return std::ranges::any_of(run.frames,
                                [&](const ListedFrame& f) { return std::ranges::any_of(f.files, is_file); }) ||
-           std::ranges::any_of(run.tables, is_file) || std::ranges::any_of(run.run_files, is_file);
+           std::ranges::any_of(run.tables, is_file) || std::ranges::any_of(run.run_files, is_file) ||
+           (!run.complete && is_frame_of(file.filename().string(), run.scene.name) &&
+            names_hash(file, run.frames_hash));
 }
 
 }  // namespace
@@ -47,21 +51,19 @@ bool is_run_folder(const std::filesystem::path& folder) {
 
 std::optional<std::filesystem::path> run_with_file(const std::filesystem::path& file) {
     if (type_behind(file) != std::filesystem::file_type::regular) return {};
-    std::error_code failure;
-    const std::filesystem::path place = std::filesystem::canonical(file, failure);
-    if (failure) throw ReadFailure(file, failure.message(), "examine");
     constexpr int kDeepest = 2;  // density/LAYER
-    std::filesystem::path folder = place;
-    for (int depth = 0; depth <= kDeepest; ++depth) {
-        folder = folder.parent_path();
-        if (!is_run_folder(folder)) continue;
-        const RunFolder run{folder, {}};
-        if (place == run.manifest() || place == run.checkpoint()) return folder;
-        try {
-            if (lists_file(read_run(folder), place)) return folder;
-        } catch (const ReadFailure&) {
-            throw;
-        } catch (const Error&) {  // damaged, or of another version: then it lists nothing
+    std::set<std::filesystem::path> seen;
+    for (std::filesystem::path folder : folders_of(file)) {
+        for (int depth = 0; depth <= kDeepest; ++depth, folder = folder.parent_path()) {
+            if (!seen.insert(folder).second || !is_run_folder(folder)) continue;
+            const RunFolder run{folder, {}};
+            if (is_same_place(run.manifest(), file) || is_same_place(run.checkpoint(), file)) return folder;
+            try {
+                if (is_of_run(read_run(folder), file)) return folder;
+            } catch (const ReadFailure&) {
+                throw;
+            } catch (const Error&) {  // damaged, or of another version: then it lists nothing
+            }
         }
     }
     return {};

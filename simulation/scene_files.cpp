@@ -15,11 +15,13 @@
 #include "core/text.h"
 #include "density/vdb/vdb_file.h"
 #include "render/image/alpha_image.h"
+#include "render/terrain/height_map.h"
 #include "scenes/format/errors.h"
 #include "scenes/format/text.h"
 #include "simulation/billboard_files.h"
 #include "simulation/layer_simulation.h"
 #include "simulation/memory.h"
+#include "simulation/run_folder.h"
 
 namespace nephos {
 namespace {
@@ -166,6 +168,18 @@ std::shared_ptr<const HeightMap> read_terrain(const Scene& scene) {
                        [&] { return make_terrain(scene.render.terrain, scene.render.ground); });
 }
 
+void require_cameras_above(const Scene& scene, const HeightMap* terrain, int first_frame, int last_frame) {
+    if (terrain == nullptr) return;
+    RenderOptions options = scene.render;
+    const bool stands = scene.render.camera.path.empty();
+    for (int number = first_frame; number <= (stands ? std::min(first_frame, last_frame) : last_frame);
+         ++number) {
+        options.camera = standing_camera(scene.render.camera, terrain, scene.render.ground,
+                                         frame_time_s(scene.frames, number - 1));
+        require_above_terrain(*terrain, options);
+    }
+}
+
 void check_files(const Scene& scene) {
     Collector found;
     found.add([&] { initial_state(scene); });
@@ -190,8 +204,20 @@ void check_files(const Scene& scene) {
         });
     for (const TextureFile& texture : texture_files(scene))
         found.add([&] { read_at_key(scene, texture.key, [&] { read_alpha_image(texture.file); }); });
-    if (scene.render.terrain.height_map) found.add([&] { read_terrain(scene); });
+    std::shared_ptr<const HeightMap> terrain;
+    // Generating heights takes its time, and they are not needed where the camera stands on them.
+    const bool may_be_below = wants_pictures(scene) && !scene.render.camera.above_ground;
+    if (scene.render.terrain.height_map || may_be_below) found.add([&] { terrain = read_terrain(scene); });
     found.throw_if_any(scene);
+    if (!wants_pictures(scene)) return;
+    try {
+        require_cameras_above(scene, terrain.get(), 1, frame_count(scene));
+    } catch (const Error& error) {
+        Problem problem;
+        problem.where.file = scene.file_places.scene_file;
+        problem.message = error.what();
+        throw_problems({std::move(problem)}, scene.file_places.scene_file, error.code());
+    }
 }
 
 }  // namespace nephos

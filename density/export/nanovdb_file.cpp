@@ -7,8 +7,10 @@
 #include <cstdint>
 #include <cstring>
 #include <istream>
+#include <limits>
 #include <new>
 #include <ostream>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -161,27 +163,88 @@ void require_within(const nanovdb::GridHandle<>& grid, const void* place, std::u
         throw std::runtime_error("its nodes lie outside of it");
 }
 
-// Sends the blocks below a node. (The library's conversion to OpenVDB would do, but for its threads: a child that was forked
-// should start none.)
-template <class Node>
-void send_node(SandboxWriter& writer, const nanovdb::GridHandle<>& grid, const CoordBBox& extent,
-               const Node& node) {
-    require_within(grid, &node, sizeof node);
-    if constexpr (Node::LEVEL == 0) {
-        std::array<float, kBlockVoxels> values;
-        for (std::uint32_t n = 0; n < kBlockVoxels; ++n) values[n] = node.getValue(n);
-        if (!std::ranges::all_of(values, [](float value) { return value >= 0 && std::isfinite(value); }))
-            throw std::runtime_error("it holds a value that is no density");
-        for (auto active = node.valueMask().beginOn(); active; ++active)
-            require_inside(extent, CoordBBox::createCube(coordinates(node.offsetToGlobalCoord(*active)), 1));
-        send_leaf(writer, coordinates(node.origin()), values.data());
-    } else {
-        for (auto child = node.beginChild(); child; ++child) send_node(writer, grid, extent, *child);
-        constexpr int kEdge = int(Node::ChildNodeType::DIM);
-        for (auto tile = node.beginValueOn(); tile; ++tile)
-            send_tiles(writer, extent, coordinates(node.offsetToGlobalCoord(tile.pos())), kEdge, *tile);
+// Sends what a reader finds in a grid: each node by its slot, by which accessors look for it, wherever it says it is. (The library's
+// conversion to OpenVDB would do, but for its threads: a child that was forked should start none.)
+class GridSender {
+  public:
+    GridSender(const nanovdb::GridHandle<>& grid, const nanovdb::TreeData<3>& tree, const CoordBBox& extent,
+               SandboxWriter& writer)
+        : grid_(grid), tree_(tree), extent_(extent), writer_(writer) {}
+
+    template <class Root>
+    void send_root(const Root& root) {
+        require_nothing(root.background());
+        std::set<std::uint64_t> keys;
+        for (std::uint32_t n = 0; n < root.data()->mTableSize; ++n) {
+            const auto* tile = root.data()->tile(n);
+            const openvdb::Coord origin = coordinates(tile->origin());
+            if (!keys.insert(tile->key).second) throw std::runtime_error("two of its nodes are in one place");
+            if (tile->isChild())
+                send_node(*root.data()->getChild(tile), origin);
+            else
+                send_tile_of(tile->value, tile->isActive(), origin, int(Root::ChildNodeType::DIM));
+        }
+        for (int level = 0; level < 3; ++level)
+            if (counts_[level] != tree_.mNodeCount[level])
+                throw std::runtime_error("it counts other nodes than it has");
     }
-}
+
+  private:
+    static void require_nothing(float value) {
+        if (value != 0) throw std::runtime_error("it has a value where there is no voxel");
+    }
+
+    // Nodes of a level lie one behind the other.
+    template <class Node>
+    void require_place(const Node& node) {
+        require_within(grid_, &node, sizeof node);
+        const auto tree = reinterpret_cast<std::uintptr_t>(&tree_),
+                   at = reinterpret_cast<std::uintptr_t>(&node) - tree;
+        const std::uint64_t first = tree_.mNodeOffset[Node::LEVEL];
+        if (at % NANOVDB_DATA_ALIGNMENT != 0 || at < first || (at - first) % sizeof node != 0 ||
+            (at - first) / sizeof node >= tree_.mNodeCount[Node::LEVEL])
+            throw std::runtime_error("its nodes do not lie where it says");
+        ++counts_[Node::LEVEL];
+    }
+
+    void send_tile_of(float value, bool is_active, const openvdb::Coord& origin, int edge) {
+        if (!is_active) return require_nothing(value);
+        send_tiles(writer_, extent_, origin, edge, value);
+    }
+
+    template <class Node>
+    void send_node(const Node& node, const openvdb::Coord& origin) {
+        require_place(node);
+        const auto place_of = [&](std::uint32_t n, int edge) {
+            const openvdb::Coord slot = coordinates(Node::OffsetToLocalCoord(n));
+            return origin + openvdb::Coord(slot.x() * edge, slot.y() * edge, slot.z() * edge);
+        };
+        if constexpr (Node::LEVEL == 0) {
+            std::array<float, kBlockVoxels> values;
+            for (std::uint32_t n = 0; n < kBlockVoxels; ++n) values[n] = node.getValue(n);
+            if (!std::ranges::all_of(values, [](float v) { return v >= 0 && std::isfinite(v); }))
+                throw std::runtime_error("it holds a value that is no density");
+            for (auto active = node.valueMask().beginOn(); active; ++active)
+                require_inside(extent_, CoordBBox::createCube(place_of(*active, 1), 1));
+            send_leaf(writer_, origin, values.data());
+        } else {
+            constexpr int kEdge = int(Node::ChildNodeType::DIM);
+            for (std::uint32_t n = 0; n < Node::SIZE; ++n) {
+                if (node.data()->mChildMask.isOn(n))
+                    send_node(*node.data()->getChild(n), place_of(n, kEdge));
+                else
+                    send_tile_of(node.data()->mTable[n].value, node.data()->mValueMask.isOn(n),
+                                 place_of(n, kEdge), kEdge);
+            }
+        }
+    }
+
+    const nanovdb::GridHandle<>& grid_;
+    const nanovdb::TreeData<3>& tree_;
+    const CoordBBox& extent_;
+    SandboxWriter& writer_;
+    std::array<std::uint32_t, 3> counts_{};  // of nodes by level
+};
 
 // Reads a file from its beginning, and nothing beyond its end.
 class FileBytes {
@@ -288,6 +351,8 @@ template <class Build>
 bool send_grid_of(const ReadGrid& read, const CoordBBox& extent, SandboxWriter& writer) {
     const nanovdb::NanoGrid<Build>* grid = read.grid.grid<Build>();
     if (grid == nullptr) return false;
+    if (grid->hasLongGridName() || grid->blindDataCount() != 0)
+        throw std::runtime_error("it says more than a grid of ours");
     require_within(read.grid, &grid->tree(), sizeof grid->tree());
     require_within(read.grid, &grid->tree().root(), sizeof grid->tree().root());
     require_within(read.grid, &grid->tree().root(), grid->tree().root().memUsage());
@@ -295,11 +360,20 @@ bool send_grid_of(const ReadGrid& read, const CoordBBox& extent, SandboxWriter& 
     if (nanovdb::checksum(*grid, nanovdb::ChecksumMode::Partial) != grid->checksum())
         throw std::runtime_error("its own checksum is of another head");
     require_head_of(read);
-    const auto& root = grid->tree().root();
-    for (auto child = root.beginChild(); child; ++child) send_node(writer, read.grid, extent, *child);
-    for (auto tile = root.beginValueOn(); tile; ++tile) {
-        const openvdb::Coord origin = coordinates(root.data()->tile(tile.pos())->origin());
-        send_tiles(writer, extent, origin, int(nanovdb::NanoUpper<Build>::DIM), *tile);
+    GridSender(read.grid, *grid->tree().data(), extent, writer).send_root(grid->tree().root());
+    return true;
+}
+
+// Returns whether the edges that a grid states are those of its map: the library takes the difference of two places, along one axis
+// for all.
+bool has_edges_of_map(const nanovdb::GridMetaData& grid) {
+    constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
+    const nanovdb::Map& map = grid.map();
+    const double farthest =
+        std::max({std::abs(map.mVecD[0]), std::abs(map.mVecD[1]), std::abs(map.mVecD[2])});
+    for (int a = 0; a < 3; ++a) {
+        const double edge = map.mMatD[4 * a], most = kRounding * (std::abs(edge) + farthest);
+        if (!(std::abs(grid.voxelSize()[a] - edge) <= most)) return false;
     }
     return true;
 }
@@ -318,8 +392,10 @@ bool is_consistent(const nanovdb::Map& map) {
 }
 
 // Size and places of voxels: a matrix, and what the centre of the first voxel is moved by.
-void send_map(SandboxWriter& writer, const nanovdb::Map& map) {
-    if (!is_consistent(map)) throw std::runtime_error("its maps contradict each other");
+void send_map(SandboxWriter& writer, const nanovdb::GridMetaData& grid) {
+    const nanovdb::Map& map = grid.map();
+    if (!is_consistent(map) || !has_edges_of_map(grid))
+        throw std::runtime_error("its maps contradict each other");
     for (const double number : map.mMatD) writer.value(number);
     for (const double number : map.mVecD) writer.value(number);
 }
@@ -344,7 +420,7 @@ void send_grid(int file, const Extent& extent, SandboxWriter& writer) {
     stream.exceptions(std::ios::badbit);  // with the system's error
     const ReadGrid read = read_grid(stream);
     require_one_grid(read.grid);
-    send_map(writer, read.grid.gridMetaData()->map());
+    send_map(writer, *read.grid.gridMetaData());
     const CoordBBox box(openvdb::Coord(0), openvdb::Coord(extent.x - 1, extent.y - 1, extent.z - 1));
     const bool is_sent = send_grid_of<float>(read, box, writer) ||
                          send_grid_of<nanovdb::Fp8>(read, box, writer) ||

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <string>
 
@@ -294,6 +295,19 @@ MeanSlope mean_slope(const HeightMap& map, double x_m, double y_m, double footpr
     if (part <= 0) return a;
     const MeanSlope b = of(coarse);
     return {a.x + part * (b.x - a.x), a.y + part * (b.y - a.y)};
+}
+
+void require_above_terrain(const HeightMap& map, const RenderOptions& options) {
+    const Vec3& eye = options.camera.position_m;
+    const double ground = ground_height_at(&map, options.ground, eye.x, eye.y);
+    if (eye.z > ground) return;
+    char text[300];
+    std::snprintf(text, sizeof text,
+                  "camera: the position %g, %g, %g is in the ground, which is %.1f m high there; expected a "
+                  "point above it, or "
+                  "camera.above_ground = true, by which heights are counted from the ground",
+                  eye.x, eye.y, eye.z, ground);
+    throw Error(ErrorCode::usage, text);
 }
 
 }  // namespace nephos

@@ -95,4 +95,7 @@ struct MeanSlope {
 };
 MeanSlope mean_slope(const HeightMap& map, double x_m, double y_m, double footprint_m);
 
+// Throws Error(usage) when the camera is not above ground and map.
+void require_above_terrain(const HeightMap& map, const RenderOptions& options);
+
 }  // namespace nephos

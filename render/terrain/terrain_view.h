@@ -22,7 +22,4 @@ struct TerrainView {
 // `bend`: earth_bend(). Rays of a mirrored eye, which is below the plane of the ground, begin at that plane.
 TerrainView terrain_view(const HeightMap& map, const RenderOptions& options, double bend);
 
-// Throws Error(usage) when the camera is not above ground and map.
-void require_above_terrain(const HeightMap& map, const RenderOptions& options);
-
 }  // namespace nephos

@@ -151,18 +151,16 @@ bool is_export_folder(const std::filesystem::path& folder) {
 
 std::optional<std::filesystem::path> export_with_file(const std::filesystem::path& file) {
     if (type_behind(file) != std::filesystem::file_type::regular) return {};
-    std::error_code failure;
-    const std::filesystem::path place = std::filesystem::canonical(file, failure);
-    if (failure) throw ReadFailure(file, failure.message(), "examine");
-    const std::filesystem::path folder = place.parent_path();
-    if (!is_export_folder(folder)) return {};
-    if (place == folder / "export.json") return folder;
-    try {
-        for (const ExportedFile& listed : read_export(folder).files)
-            if (is_same_place(folder / listed.path, place)) return folder;
-    } catch (const ReadFailure&) {
-        throw;
-    } catch (const Error&) {  // damaged, or of another version: then it lists nothing
+    for (const std::filesystem::path& folder : folders_of(file)) {
+        if (!is_export_folder(folder)) continue;
+        if (is_same_place(folder / "export.json", file)) return folder;
+        try {
+            for (const ExportedFile& listed : read_export(folder).files)
+                if (is_same_place(folder / listed.path, file)) return folder;
+        } catch (const ReadFailure&) {
+            throw;
+        } catch (const Error&) {  // damaged, or of another version: then it lists nothing
+        }
     }
     return {};
 }

@@ -182,7 +182,7 @@ void require_halves(const ExportOptions& options, const ExportSequence& s, const
     }
 }
 
-// Throws Error(usage) where values, or their means, are so small that the library, which divides codes by the range of a leaf, finds
+// Throws Error(usage) where values, or their means, are so large or small that the library, which divides codes by the range of a leaf, finds
 // infinity.
 void require_codes(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
                    FrameVoxels& voxels) {
@@ -190,6 +190,13 @@ void require_codes(const ExportOptions& options, const ExportSequence& s, const 
     const auto codes = float(largest_code(options.quantise));
     // A leaf of a smaller range than codes / max float is lost in half of a code of the largest value.
     const float least = 2 * codes * codes / std::numeric_limits<float>::max();
+    // The library rounds thrice on the way from the largest code, to infinity at the end of floats.
+    const float most = std::numeric_limits<float>::max() * (1 - 4 * 0x1p-24F);
+    if (voxels.largest_cell() > most && voxels.largest() > most)
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: its largest value, or mean, is {:.9g}, and --quantise takes grids up "
+                                "to {:.9g}: expected --quantise none",
+                                frame.file.string(), voxels.largest(), most));
     const double factor = s.layout.factor;
     if (double(voxels.largest_cell()) / (factor * factor * factor) >= double(least)) return;
     if (voxels.largest() >= least) return;

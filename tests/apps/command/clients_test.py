@@ -119,7 +119,7 @@ class Reports(Case):
                 groups = sorted(cloud["quantity"] + f"{cloud['height'] // 100:03}" for cloud in trend["clouds"] if "height" in cloud)
                 for group in groups:
                     self.assertIn(group, period["layers"], forecast)
-            self.call("metar", forecast, "-o", "taf.toml", "--date", "2024-06", "--at", "51.5,-0.5,25", "-q")
+            self.call("metar", forecast, "-o", "taf.toml", "--overwrite", "--date", "2024-06", "--at", "51.5,-0.5,25", "-q")
             self.call("validate", "taf.toml")
 
 

@@ -356,6 +356,15 @@ class Export(Case):
         self.call("export", "apart.vdb", "--to", "vdb", "--to", "nvdb", "-o", "apart")
         self.call("verify", "apart")
 
+    def test_codes_of_the_largest_floats_are_refused(self):
+        for value, status in ((3.4028235e38, 2), (3.4028225e38, 0)):
+            self.write_apart(8, value=value)
+            for bits in ("fp8", "fp16"):
+                said = self.call("export", "apart.vdb", "--to", "nvdb", "--quantise", bits, "-o", f"{bits}-{status}", status=status).stderr
+                self.assertEqual("--quantise takes grids up to 3.40282" in said, status == 2, said)
+                if status == 0:
+                    self.call("verify", f"{bits}-0")
+
     def test_halves_hold_means(self):
         """One value beyond 16-bit floats among many whose mean is not."""
         self.write_apart(16)
@@ -1160,8 +1169,7 @@ class Export(Case):
         changed("placed_0003.nvdb", lambda file: file.replace(struct.pack("<d", size), struct.pack("<d", size * 2)), "contradict each other")
         changed("placed_0003.nvdb", lambda file: file.replace(struct.pack("<f", size), struct.pack("<f", size * 2)), "contradict each other")
         changed("placed_0003.nvdb", lambda file: file[:208] + file[208:].replace(b"density\0", b"densitx\0"), "its own checksum is of another head")
-        changed("placed_0003.nvdb", lambda file: (file[:208] + file[208:].replace(b"density\0", b"densitx\0"))[:208] + file[208:216] + b"\xff" * 8 +
-                file[224:], "its own checksum is of another head")
+        changed("placed_0003.nvdb", lambda file: file[:208] + b"\xff" * 8 + file[216:].replace(b"density\0", b"densitx\0"), "its own checksum is of another head")
         for at in (16 + 24, 16 + 48, 16 + 120, 16 + 156):  # voxels, box, edge and nodes in the file's head
             changed("placed_0003.nvdb", lambda file, at=at: file[:at] + bytes([file[at] ^ 1]) + file[at + 1:], "its head is of another grid")
         whole = (folder / "placed_0003.nvdb").read_bytes()
@@ -1169,6 +1177,16 @@ class Export(Case):
         for at in (*range(tree + 24, tree + 32), *range(tree + 64 + 24, tree + 64 + 28)):  # where the root is, and how many tiles it has
             for bit in (1, 0x80):
                 changed("placed_0003.nvdb", lambda file, at=at, bit=bit: file[:at] + bytes([file[at] ^ bit]) + file[at + 1:], "or is damaged: ")
+        first_of_level = struct.unpack_from("<4Q", whole, tree)
+        lower = tree + first_of_level[1]
+        children, table = numpy.unpackbits(numpy.frombuffer(whole, "u1", 512, lower + 544), bitorder="little").nonzero()[0], lower + 1088
+        a, b = table + 8 * int(children[0]), table + 8 * int(children[-1])
+        self.assertLess(a, b)
+        empty = table + 8 * next(n for n in range(4096) if n not in children)
+        for change in (lambda file: file[:a] + file[b:b + 8] + file[a + 8:b] + file[a:a + 8] + file[b + 8:],  # two leaves, each in the other's slot
+                       lambda file: file[:empty] + struct.pack("<f", 0.7) + file[empty + 4:], lambda file: file[:a] + struct.pack("<q", 1) + file[a + 8:],
+                       lambda file: file[:tree] + struct.pack("<Q", first_of_level[0] + 32) + file[tree + 8:]):
+            changed("placed_0003.nvdb", change, "FAIL")
         changed("placed_0003.nvdb", lambda file: file[:199] + b"x" + file[200:], "its grid's name has no end")
         changed("placed_0003.nvdb", lambda file: file[:205] + b"x" + file[206:], "its grid does not begin as one")
         for end in (b" ", b" " * 400):

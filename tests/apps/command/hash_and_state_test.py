@@ -4,9 +4,10 @@
 import json
 import os
 import pathlib
+import shutil
 import unittest
 
-from case import Case, LAYERED, rows_of, SCENE, SOURCE, voxels
+from case import Case, LAYERED, rows_of, SCENE, SOURCE, unsealed, voxels
 
 
 class Hash(Case):
@@ -75,6 +76,20 @@ class State(Case):
         self.refused(2, "render", "out/density/tiny_0003.vdb", "--out", "exported/tiny_0002.png", "--splatting", "cpu",
                      says="exported/tiny_0002.png: is a file of the export in ")
         self.assertEqual(contents(), before)
+        # Folders and files that the user has put elsewhere.
+        (self.folder / "disk").mkdir()
+        shutil.move(self.folder / "out/density", self.folder / "disk/density")
+        (self.folder / "out/density").symlink_to("../disk/density")
+        shutil.move(self.folder / "exported/tiny_0002.vdb", self.folder / "disk/away.vdb")
+        (self.folder / "exported/tiny_0002.vdb").symlink_to("../disk/away.vdb")
+        for file in ("out/density/tiny_0002.vdb", "exported/tiny_0002.vdb"):
+            self.refused(2, "state", self.scene, "--steps", "1", "--out", file, says=f"{file}: is a file of the ")
+        # A frame that is written, and not listed yet.
+        manifest = self.folder / "out/manifest.json"
+        text = manifest.read_text()
+        manifest.write_text(unsealed({**json.loads(text), "complete": False, "frames": []}))
+        self.refused(2, "state", self.scene, "--steps", "1", "--out", "out/density/tiny_0002.vdb", says="is a file of the run in ")
+        manifest.write_text(text)
         for _ in range(2):  # what the run does not list may be replaced
             self.call("state", self.scene, "--steps", "1", "--out", "out/density/state.vdb", "-q")
             self.call("render", "out/density/tiny_0003.vdb", "--out", "out/picture.png", "--splatting", "cpu", "--size", "32x24", "-q")

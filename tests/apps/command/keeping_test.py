@@ -457,6 +457,16 @@ class Keeping(Case):
         self.call(*self.plain, "--out", "out", "--overwrite")
         self.assertEqual((self.folder / "victim.mp4").read_text(), "mine")
 
+    def test_a_camera_in_the_ground_is_refused_before_a_run_is_removed(self):
+        scene = self.write("high.toml", 'ground = { relief = "hills" }\nterrain = { cells = 16 }\n' + SCENE)
+        run = ("run", scene, "--splatting", "cpu", "--out", "out", "-q")
+        self.call(*run, "--set", "camera.above_ground=true")
+        low = ("--set", "camera.above_ground=false", "--set", "camera.position_m=[500,500,-5]")
+        says = "camera: the position 500, 500, -5 is in the ground"
+        self.kept("out", 2, *run, "--overwrite", *low, says=says)
+        self.assertIn(says, self.call("validate", scene, *low, status=2).stderr)
+        self.refused(2, "run", scene, "--splatting", "cpu", "--out", "new", *low, says=says)
+
     def test_files_that_a_call_reads(self):
         self.call(*self.plain, "--out", "out")
         frame = self.folder / "out/density/tiny_0003.vdb"
