@@ -206,8 +206,10 @@ void check_files(const Scene& scene) {
         found.add([&] { read_at_key(scene, texture.key, [&] { read_alpha_image(texture.file); }); });
     std::shared_ptr<const HeightMap> terrain;
     // Generating heights takes its time, and they are not needed where the camera stands on them.
-    const bool may_be_below = wants_pictures(scene) && !scene.render.camera.above_ground;
-    if (scene.render.terrain.height_map || may_be_below) found.add([&] { terrain = read_terrain(scene); });
+    const TerrainOptions& options = scene.render.terrain;
+    const bool is_needed =
+        options.relief != Relief::none && wants_pictures(scene) && !scene.render.camera.above_ground;
+    if (options.height_map || is_needed) found.add([&] { terrain = read_terrain(scene); });
     found.throw_if_any(scene);
     if (!wants_pictures(scene)) return;
     try {

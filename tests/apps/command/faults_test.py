@@ -190,7 +190,7 @@ class Faults(Case):
             with self.subTest(name=name):
                 shutil.copy(SOURCE / "scenes/maps" / source, self.folder / name)
                 map_of = ["validate", self.scene, "--set", f"ground.height_map={name}", "--set", "terrain.raw_columns=65",
-                          "--set", "terrain.raw_rows=65"]
+                          "--set", "terrain.raw_rows=65", "--set", "camera.above_ground=true"]
                 self.assertGreaterEqual(self.fails_at_each_call("read", name, *map_of), 1)
 
     @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")

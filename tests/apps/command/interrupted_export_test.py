@@ -274,7 +274,8 @@ class InterruptedExport(Case):
         """Damaged, very long or none at all, they let nothing in and take no memory."""
         whole = self.export("whole", "--to", "raw")
         for number, notes in enumerate((b"\0" * 100, b"[" * 100_000, b'{"path": "../run/manifest.json", "bytes": 1, "xxh3": "0"}\n', b"", None)):
-            self.killed("rename", 2, f"out-{number}/placed_", "--to", "raw", "-o", f"out-{number}")
+            # One frame at a time, so that the first is in its place when the second is about to get there.
+            self.killed("rename", 2, f"out-{number}/placed_", "--to", "raw", "-o", f"out-{number}", "-j", "1")
             path = self.folder / f"out-{number}/.nephos-export/notes.jsonl"
             path.write_bytes(notes or b"")
             if notes is None:
