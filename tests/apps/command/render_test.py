@@ -304,15 +304,18 @@ class Pictures(Case):
         self.call(*command[1:])
         self.call("verify", "out")
 
-    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
-    def test_a_video_that_failed_is_made_by_resuming(self):
-        """A failing ffmpeg does not end the run; nor does a run that goes on with more steps keep the old video."""
+    def failing_ffmpeg(self):
+        """The environment of a call whose ffmpeg fails."""
         broken = self.folder / "broken"
         broken.mkdir()
         (broken / "ffmpeg").write_text("#!/bin/sh\necho 'disk full' >&2\nexit 3\n")
         (broken / "ffmpeg").chmod(0o700)
-        self.refused(3, "run", self.scene, "--video", "--out", "out", "--quiet", says="disk full",
-                     env={"PATH": f"{broken}:{os.environ['PATH']}"})
+        return {"PATH": f"{broken}:{os.environ['PATH']}"}
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_a_video_that_failed_is_made_by_resuming(self):
+        """A failing ffmpeg does not end the run; nor does a run that goes on with more steps keep the old video."""
+        self.refused(3, "run", self.scene, "--video", "--out", "out", "--quiet", says="disk full", env=self.failing_ffmpeg())
         self.assertEqual(len(list((self.folder / "out/frames").iterdir())), 5, "pictures and no video")
         video = self.folder / "out/frames/tiny.mp4"
         for steps in (6, 9):
@@ -324,12 +327,8 @@ class Pictures(Case):
     @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
     def test_a_video_of_the_users_is_kept_by_a_run_that_goes_on(self):
         """One that another program made of the frames so far: a run knows its own by what it names."""
-        broken = self.folder / "broken"
-        broken.mkdir()
-        (broken / "ffmpeg").write_text("#!/bin/sh\nexit 3\n")
-        (broken / "ffmpeg").chmod(0o700)
         call = ("run", self.scene, "--video", "--splatting", "cpu", "--out", "out", "-q")
-        self.refused(3, *call, says="ffmpeg", env={"PATH": f"{broken}:{os.environ['PATH']}"})
+        self.refused(3, *call, says="ffmpeg", env=self.failing_ffmpeg())
         video, manifest = self.folder / "out/frames/tiny.mp4", self.folder / "out/manifest.json"
         checkpoint = self.folder / "out/checkpoint.nephos"
         for content in (b"mine", b""):
