@@ -66,6 +66,7 @@ class InputFile {
     InputFile& operator=(const InputFile&) = delete;
 
     std::filesystem::path path() const { return "/proc/self/fd/" + std::to_string(fd_); }
+    int descriptor() const { return fd_; }
 
   private:
     int fd_;
@@ -84,6 +85,7 @@ class Names {
     ~Names() { std::filesystem::remove_all(folder_); }
     Names(const Names&) = delete;
     Names& operator=(const Names&) = delete;
+    const std::filesystem::path& path() const { return folder_; }
     std::filesystem::path of(const InputFile& file, const char* ending) const {
         const std::filesystem::path link = folder_ / (std::string("input") + ending);
         std::filesystem::remove(link);
