@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -120,12 +121,42 @@ std::filesystem::path normal_path(const std::filesystem::path& path) {
     return is_folder ? whole : whole / name;
 }
 
-std::vector<std::filesystem::path> folders_of(const std::filesystem::path& file) {
-    std::error_code failure;
-    const std::filesystem::path by_path = std::filesystem::absolute(file, failure),
-                                resolved = std::filesystem::canonical(file, failure);
-    if (failure) throw ReadFailure(file, failure.message(), "examine");
-    return {normal_path(by_path).parent_path(), resolved.parent_path()};
+std::vector<std::filesystem::path> paths_to(const std::filesystem::path& file) {
+    constexpr std::size_t kMostLinks = 40;  // as the system
+    std::vector<std::filesystem::path> paths{file};
+    std::filesystem::path done;  // has no links
+    std::filesystem::path left = file;
+    while (!left.empty() && paths.size() <= kMostLinks) {
+        const std::filesystem::path part = *left.begin();
+        std::filesystem::path rest;
+        for (auto next = std::next(left.begin()); next != left.end(); ++next) rest /= *next;
+        const std::filesystem::path at = done / part;
+        std::error_code error;
+        const bool is_link =
+            std::filesystem::symlink_status(at, error).type() == std::filesystem::file_type::symlink;
+        const std::filesystem::path target =
+            is_link ? std::filesystem::read_symlink(at, error) : std::filesystem::path();
+        // Links of /proc lead to files without a name.
+        if (error == std::errc::no_such_file_or_directory) break;
+        if (error) throw ReadFailure(at, error.message(), "examine");
+        if (is_link) {
+            left = rest.empty() ? target : target / rest;
+            paths.push_back(done / left);  // an absolute target replaces what was done
+            if (target.is_absolute()) done.clear();
+        } else {
+            left = rest;
+            done = at;
+        }
+    }
+    return paths;
+}
+
+std::filesystem::path holder_of(const std::filesystem::path& path) {
+    const std::filesystem::path name = path.filename();
+    if (name.empty() && path.has_relative_path()) return holder_of(path.parent_path());
+    if (path.empty() || name == "." || name == "..") return path / "..";
+    const std::filesystem::path holder = path.parent_path();
+    return holder.empty() ? "." : holder;
 }
 
 }  // namespace nephos

@@ -44,7 +44,11 @@ std::vector<std::string> names_in_folder(const std::filesystem::path& folder);
 // ".." goes back through a link, with the links of its folder resolved. Where nothing is there it is by its text.
 std::filesystem::path normal_path(const std::filesystem::path& path);
 
-// Returns the folders that hold a file: by its path, and with all links resolved. Throws ReadFailure where nothing is there.
-std::vector<std::filesystem::path> folders_of(const std::filesystem::path& file);
+// Returns the path of a file, and what it becomes as one link after the other is followed, of its folders or of the file itself: all
+// lead to it, through the folders that hold it or a link to it. Throws ReadFailure where a link cannot be read.
+std::vector<std::filesystem::path> paths_to(const std::filesystem::path& file);
+
+// Returns the folder that holds a file or folder, by the text of its path where that names it.
+std::filesystem::path holder_of(const std::filesystem::path& path);
 
 }  // namespace nephos

@@ -2,7 +2,7 @@
 #include "simulation/run_listing.h"
 
 #include <algorithm>
-#include <set>
+#include <system_error>
 
 #include <nlohmann/json.hpp>
 
@@ -31,16 +31,25 @@ ListedFrame frame_of(const Json& json, const std::filesystem::path& manifest) {
     return frame;
 }
 
-// Returns whether the run lists the file, or, while it is not complete, has made it and not listed it yet.
+// Returns whether the run lists the file, or, while it is not complete, has made it at this path and not listed it yet.
 bool is_of_run(const RunListing& run, const std::filesystem::path& file) {
     const auto is_file = [&](const FileRecord& record) {
         return is_same_place(run.folder / record.path, file);
     };
-    return std::ranges::any_of(run.frames,
-                               [&](const ListedFrame& f) { return std::ranges::any_of(f.files, is_file); }) ||
-           std::ranges::any_of(run.tables, is_file) || std::ranges::any_of(run.run_files, is_file) ||
-           (!run.complete && is_frame_of(file.filename().string(), run.scene.name) &&
-            names_hash(file, run.frames_hash));
+    const bool is_listed =
+        std::ranges::any_of(run.frames,
+                            [&](const ListedFrame& f) { return std::ranges::any_of(f.files, is_file); }) ||
+        std::ranges::any_of(run.tables, is_file) || std::ranges::any_of(run.run_files, is_file);
+    if (is_listed || run.complete) return is_listed;
+    return !OwnFiles(run.folder, read_manifest(run.folder / "manifest.json"), run.scene).why_foreign(file);
+}
+
+// What is above the folders of a user may be none of them: where they may not look, no run of theirs is.
+bool may_be_run_folder(const std::filesystem::path& folder) {
+    std::error_code error;
+    const auto type = std::filesystem::status(folder / "manifest.json", error).type();
+    if (type == std::filesystem::file_type::none && error == std::errc::permission_denied) return false;
+    return is_run_folder(folder);
 }
 
 }  // namespace
@@ -52,14 +61,14 @@ bool is_run_folder(const std::filesystem::path& folder) {
 std::optional<std::filesystem::path> run_with_file(const std::filesystem::path& file) {
     if (type_behind(file) != std::filesystem::file_type::regular) return {};
     constexpr int kDeepest = 2;  // density/LAYER
-    std::set<std::filesystem::path> seen;
-    for (std::filesystem::path folder : folders_of(file)) {
-        for (int depth = 0; depth <= kDeepest; ++depth, folder = folder.parent_path()) {
-            if (!seen.insert(folder).second || !is_run_folder(folder)) continue;
+    for (const std::filesystem::path& path : paths_to(file)) {
+        std::filesystem::path folder = holder_of(path);
+        for (int depth = 0; depth <= kDeepest; ++depth, folder = holder_of(folder)) {
+            if (!may_be_run_folder(folder)) continue;
             const RunFolder run{folder, {}};
-            if (is_same_place(run.manifest(), file) || is_same_place(run.checkpoint(), file)) return folder;
+            if (is_same_place(run.manifest(), path) || is_same_place(run.checkpoint(), path)) return folder;
             try {
-                if (is_of_run(read_run(folder), file)) return folder;
+                if (is_of_run(read_run(folder), path)) return folder;
             } catch (const ReadFailure&) {
                 throw;
             } catch (const Error&) {  // damaged, or of another version: then it lists nothing

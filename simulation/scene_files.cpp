@@ -169,13 +169,19 @@ std::shared_ptr<const HeightMap> read_terrain(const Scene& scene) {
 }
 
 void require_cameras_above(const Scene& scene, const HeightMap* terrain, int first_frame, int last_frame) {
-    if (terrain == nullptr) return;
+    const Camera& camera = scene.render.camera;
+    if (!scene.render.terrain.any() || first_frame > last_frame) return;
     RenderOptions options = scene.render;
-    const bool stands = scene.render.camera.path.empty();
-    for (int number = first_frame; number <= (stands ? std::min(first_frame, last_frame) : last_frame);
-         ++number) {
-        options.camera = standing_camera(scene.render.camera, terrain, scene.render.ground,
-                                         frame_time_s(scene.frames, number - 1));
+    for (int number = first_frame; number <= (camera.path.empty() ? first_frame : last_frame); ++number) {
+        const double time_s = frame_time_s(scene.frames, number - 1);
+        const double height_m = camera_at(camera, time_s).position_m.z;
+        if (camera.above_ground && !(height_m > 0))
+            throw Error(ErrorCode::usage,
+                        fmt::format("camera: the position is {} m above the ground; expected more than 0, or "
+                                    "camera.above_ground = false, by which heights are those of the world",
+                                    number_text(height_m, 6)));
+        if (terrain == nullptr) continue;
+        options.camera = standing_camera(camera, terrain, scene.render.ground, time_s);
         require_above_terrain(*terrain, options);
     }
 }

@@ -49,8 +49,8 @@ FileStamps stamps_of(const Scene& scene, const std::vector<FileKind>& kinds);
 // Returns make_terrain() of the scene. Throws as it does, with the place of the height map.
 std::shared_ptr<const HeightMap> read_terrain(const Scene& scene);
 
-// Throws Error(usage) when the camera lies in the ground in a frame of these numbers, for which no picture can be drawn. `terrain`:
-// that of the scene; null: level ground, below which a camera may be. Thread-safe.
+// Throws Error(usage) when the camera lies in the ground in a frame of these numbers, for which no picture can be drawn; below level
+// ground it may be. `terrain`: that of the scene; null: only heights above the ground are looked at. Thread-safe.
 void require_cameras_above(const Scene& scene, const HeightMap* terrain, int first_frame, int last_frame);
 
 // Reads every file that the scene names, also the states that it starts from and those of its pictures, and forgets what is

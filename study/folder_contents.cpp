@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/folder_contents.h"
 
+#include <algorithm>
 #include <functional>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -71,6 +73,16 @@ bool is_foreign(const fs::path& file, const std::function<bool()>& is_ours) {
     return true;
 }
 
+// Returns whether a file is called and begins like one of the tables in a sweep's folder.
+bool is_table_of_sweep(const fs::path& file) {
+    const std::string name = file.filename().string();
+    if (name == "timing.csv") return true;
+    if (name == "series.nc") return is_series_of_sweep(file);
+    return std::ranges::any_of(kTables, [&](const auto& table) {
+        return table.first == name && (begins_with(file, table.second) || is_unmarked(holder_of(file), name));
+    });
+}
+
 }  // namespace
 
 void require_absent(const fs::path& file, std::string_view by) {
@@ -104,6 +116,34 @@ void require_fit_folder(const fs::path& folder) {
     // Its columns are keys of a scene; it is written after the fitted scene.
     if (!begins_with(folder / "fitted.toml", kWrittenByFit))
         require_absent(folder / "posterior.csv", "a fit");
+}
+
+std::optional<fs::path> sweep_with_file(const fs::path& file) {
+    if (type_behind(file) != fs::file_type::regular) return {};
+    for (const fs::path& path : paths_to(file)) {
+        const std::string name = path.filename().string();
+        const fs::path folder = holder_of(path);
+        if (name == "lock" || is_name_of_shard(fs::path(name).replace_extension(".jsonl"))) {
+            const fs::path sweep = holder_of(folder);
+            if (is_same_place(sweep / "shards", folder) && has_shards(sweep)) return sweep;
+        }
+        if (is_table_of_sweep(path) &&
+            (has_shards(folder) || begins_with(folder / "manifest.json", kSweepManifest)))
+            return folder;
+    }
+    return {};
+}
+
+std::optional<fs::path> fit_with_file(const fs::path& file) {
+    if (type_behind(file) != fs::file_type::regular) return {};
+    for (const fs::path& path : paths_to(file)) {
+        const std::string name = path.filename().string();
+        const fs::path folder = holder_of(path);
+        const bool is_result = name == "fit.json" || name == "posterior.csv" ||
+                               (name == "fitted.toml" && begins_with(path, kWrittenByFit));
+        if (is_result && begins_with(folder / "fit.json", kFit)) return folder;
+    }
+    return {};
 }
 
 }  // namespace nephos

@@ -4,6 +4,7 @@
 // Tells files that a sweep or fit wrote from those of others, before anything is written into their folder.
 
 #include <filesystem>
+#include <optional>
 #include <string_view>
 
 namespace nephos {
@@ -23,5 +24,10 @@ void require_absent(const std::filesystem::path& file, std::string_view by);
 
 // Throws Error(usage) when the file is there and does not begin as those that `by` writes: "a sweep". Thread-safe.
 void require_own(const std::filesystem::path& file, std::string_view beginning, std::string_view by);
+
+// Return the folder of the sweep, or of the fit, that wrote the file, through links, too; nothing: none did. Throw ReadFailure.
+// Thread-safe.
+std::optional<std::filesystem::path> sweep_with_file(const std::filesystem::path& file);
+std::optional<std::filesystem::path> fit_with_file(const std::filesystem::path& file);
 
 }  // namespace nephos

@@ -21,18 +21,6 @@
 namespace nephos {
 namespace {
 
-// Returns true for "0003-of-0012.jsonl".
-bool is_name_of_shard(const std::filesystem::path& path) {
-    const std::string name = path.stem().string();
-    const std::size_t middle = name.find("-of-");
-    const auto is_number = [](std::string_view text) {
-        return text.size() >= 4 && text.find_first_not_of("0123456789") == text.npos;
-    };
-    return path.extension() == ".jsonl" && middle != name.npos &&
-           is_number(std::string_view(name).substr(0, middle)) &&
-           is_number(std::string_view(name).substr(middle + 4));
-}
-
 // Returns whether a line of a file ends as records do: what is damaged in its beginning tells so what it was.
 bool has_end_of_record(const std::filesystem::path& path) {
     constexpr std::size_t kMostBytes = std::size_t(1) << 20;
@@ -43,6 +31,17 @@ bool has_end_of_record(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+bool is_name_of_shard(const std::filesystem::path& path) {
+    const std::string name = path.stem().string();
+    const std::size_t middle = name.find("-of-");
+    const auto is_number = [](std::string_view text) {
+        return text.size() >= 4 && text.find_first_not_of("0123456789") == text.npos;
+    };
+    return path.extension() == ".jsonl" && middle != name.npos &&
+           is_number(std::string_view(name).substr(0, middle)) &&
+           is_number(std::string_view(name).substr(middle + 4));
+}
 
 void require_own_records(const std::filesystem::path& path) {
     constexpr std::string_view kRecord = "{\"run\":\"";

@@ -9,6 +9,9 @@
 
 namespace nephos {
 
+// Returns whether a file is called as one of records: 0003-of-0012.jsonl.
+bool is_name_of_shard(const std::filesystem::path& path);
+
 // Returns the files of records in a folder, sorted by name. Throws Error(io). Thread-safe.
 std::vector<std::filesystem::path> files_of_shards(const std::filesystem::path& folder);
 

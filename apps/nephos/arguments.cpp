@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "study/folder_contents.h"
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
@@ -212,9 +213,15 @@ void refuse_to_replace_files_of(Scene scene, const std::string& to) {
 
 void refuse_to_replace_listed_file(const std::string& to) {
     const auto refuse = [&](const char* kind, const std::filesystem::path& folder) {
-        throw Error(ErrorCode::usage, to + ": is a file of the " + kind + " in " + folder.string() +
+        std::error_code error;
+        std::filesystem::path whole = std::filesystem::absolute(folder, error);
+        whole = normal_path(error ? folder : whole);
+        if (!whole.has_filename()) whole = whole.parent_path();  // "a/"
+        throw Error(ErrorCode::usage, to + ": is a file of the " + kind + " in " + whole.string() +
                                           ": expected the name of another one to write");
     };
+    if (const auto sweep = sweep_with_file(to)) refuse("sweep", *sweep);
+    if (const auto fit = fit_with_file(to)) refuse("fit", *fit);
     if (const auto run = run_with_file(to)) refuse("run", *run);
     if (const auto exported = export_with_file(to)) refuse("export", *exported);
 }

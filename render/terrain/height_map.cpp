@@ -304,8 +304,7 @@ void require_above_terrain(const HeightMap& map, const RenderOptions& options) {
     char text[300];
     std::snprintf(text, sizeof text,
                   "camera: the position %g, %g, %g is in the ground, which is %.1f m high there; expected a "
-                  "point above it, or "
-                  "camera.above_ground = true, by which heights are counted from the ground",
+                  "point above it (with camera.above_ground = true, heights are counted from the ground)",
                   eye.x, eye.y, eye.z, ground);
     throw Error(ErrorCode::usage, text);
 }

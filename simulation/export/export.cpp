@@ -246,6 +246,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     std::vector<std::string> notes;
     std::optional<RunListing> run = run_of(options);
     std::vector<ExportSequence> sequences = list_sequences(options, run, notes);
+    const bool is_of_run = run.has_value();
     if (options.weather.empty()) run.reset();  // it is for weather alone from here on
     ExportReport report = report_of(options, sequences);
     require_room(options, sequences);
@@ -312,10 +313,11 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                                 take_moment(loaded, frame);
                                 if (loaded.metadata) winds.add(frame.time_s, loaded.metadata->wind);
                                 if (s.of_nephos && !loaded.metadata)
-                                    notes.push_back(
-                                        fmt::format("{}: says of no moment, unlike the first file: it is "
-                                                    "given that one's, {:g} s",
-                                                    frame.file.string(), frame.time_s));
+                                    notes.push_back(fmt::format(
+                                        "{}: says of no moment, unlike the first file: it is "
+                                        "given that {}, {:g} s",
+                                        frame.file.string(),
+                                        is_of_run ? "of its run's manifest" : "of that one", frame.time_s));
                                 for (const std::string& note : loaded.notes)
                                     notes.push_back(frame.file.string() + ": " + note);
                                 work.add([&, read] {
@@ -330,7 +332,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 work.finish_quietly();
                 throw;
             }
-            if (!options.files.empty() || !is_run_folder(options.source)) s.wind = winds.take();
+            if (!is_of_run) s.wind = winds.take();
             stopped = stopped || !goes_on();
             lock.require_in_place();
             if (stopped) return stop();

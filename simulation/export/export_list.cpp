@@ -149,18 +149,34 @@ bool is_export_folder(const std::filesystem::path& folder) {
     return type_behind(folder / "export.json") == std::filesystem::file_type::regular;
 }
 
+namespace {
+
+// Those that are listed, and those that an export at work, or one that was killed, has made since.
+std::vector<ExportedFile> known_files(const std::filesystem::path& folder) {
+    std::vector<ExportedFile> files = noted_files(folder);
+    std::erase_if(files, [&](const ExportedFile& file) {
+        return type_behind(folder / file.path) != std::filesystem::file_type::regular ||
+               !(file_digest(folder / file.path) == file.digest);
+    });
+    try {
+        for (ExportedFile& file : read_export(folder).files) files.push_back(std::move(file));
+    } catch (const ReadFailure&) {
+        throw;
+    } catch (const Error&) {  // damaged, or of another version: then it lists nothing
+    }
+    return files;
+}
+
+}  // namespace
+
 std::optional<std::filesystem::path> export_with_file(const std::filesystem::path& file) {
     if (type_behind(file) != std::filesystem::file_type::regular) return {};
-    for (const std::filesystem::path& folder : folders_of(file)) {
+    for (const std::filesystem::path& path : paths_to(file)) {
+        const std::filesystem::path folder = holder_of(path);
         if (!is_export_folder(folder)) continue;
-        if (is_same_place(folder / "export.json", file)) return folder;
-        try {
-            for (const ExportedFile& listed : read_export(folder).files)
-                if (is_same_place(folder / listed.path, file)) return folder;
-        } catch (const ReadFailure&) {
-            throw;
-        } catch (const Error&) {  // damaged, or of another version: then it lists nothing
-        }
+        if (is_same_place(folder / "export.json", path)) return folder;
+        for (const ExportedFile& known : known_files(folder))
+            if (is_same_place(folder / known.path, path)) return folder;
     }
     return {};
 }

@@ -190,10 +190,15 @@ void check_numbers(const CheckedJson& json, const ListedExport& list, const List
         json.at("frames").fail(fmt::format("{} frames, as in export.json", files));
 }
 
-// Returns whether all of its sources are there and unchanged. Throws Error(io) that names the first value which is not what the
-// list or a source says.
-bool check_sidecar(const std::filesystem::path& folder, const std::filesystem::path& path,
-                   const ListedExport& list, const ListedExport::Sequence& s, const ListedFiles& listed) {
+// How far a sidecar could be compared.
+struct Compared {
+    bool sources = true;                 // all are there and unchanged
+    std::size_t frames = 0, untold = 0;  // untold: whose files say nothing of their time
+};
+
+// Throws Error(io) that names the first value which is not what the list or a source says.
+Compared check_sidecar(const std::filesystem::path& folder, const std::filesystem::path& path,
+                       const ListedExport& list, const ListedExport::Sequence& s, const ListedFiles& listed) {
     const nlohmann::ordered_json parsed = parsed_json(path);
     const CheckedJson json(parsed, path);
     require_text(json.at("format"), "nephos volume");
@@ -203,22 +208,26 @@ bool check_sidecar(const std::filesystem::path& folder, const std::filesystem::p
         json.at("scale").fail(fmt::format("{}, as in export.json", s.scale));
     const std::vector<NamedFormat> formats = check_formats(json, list, s);
     check_numbers(json, list, s, listed, formats);
-    bool compared = true;
+    Compared compared;
     const std::vector<CheckedJson> frames = json.at("frames").items();
     for (std::size_t n = 0; n < frames.size(); ++n) {
         const int number = int(frames[n].at("number").integer(0, INT32_MAX));
         const std::string name = fmt::format("{}_{:04}{}", s.name, number, formats.front().extension);
         const std::optional<LoadedDensity> source = source_of(folder, list, *listed.at(name));
-        compared = compared && source;
+        compared.sources = compared.sources && source;
+        ++compared.frames;
         if (!source) continue;
         const nlohmann::ordered_json expected = expected_sidecar(list, s, *source, number);
         if (n == 0) check_box(json, parsed, expected);
         const nlohmann::ordered_json &frame = parsed.at("frames").at(n),
                                      &of_source = expected.at("frames").front();
-        constexpr std::string_view kFigures[] = {"utc", "sum", "max"}, kTime[] = {"time_s"};
+        constexpr std::string_view kFigures[] = {"sum", "max"}, kTime[] = {"time_s", "utc"};
         check_values(frames[n], frame, of_source, kFigures);
-        // A file of another program among those of nephos has the time of the first.
-        if (source->metadata) check_values(frames[n], frame, of_source, kTime);
+        // A file of another program has the time of the first, or that of its run's manifest.
+        if (source->metadata)
+            check_values(frames[n], frame, of_source, kTime);
+        else
+            ++compared.untold;
     }
     return compared;
 }
@@ -228,7 +237,7 @@ bool check_sidecar(const std::filesystem::path& folder, const std::filesystem::p
 std::vector<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list) {
     ListedFiles listed;
     for (const ExportedFile& file : list.files) listed.emplace(file.path.generic_string(), &file);
-    std::size_t count = 0, compared = 0;
+    std::size_t count = 0, compared = 0, frames = 0, untold = 0;
     Problems bad, unread;
     for (const ListedExport::Sequence& s : list.sequences) {
         const std::string name = s.name + ".volume.json";
@@ -240,7 +249,10 @@ std::vector<Check> check_sidecars(const std::filesystem::path& folder, const Lis
                             (folder / "export.json").string() + ": lists volumes, but no " + name);
             }
             ++count;
-            compared += check_sidecar(folder, folder / name, list, s, listed);
+            const Compared one = check_sidecar(folder, folder / name, list, s, listed);
+            compared += one.sources;
+            frames += one.frames;
+            untold += one.untold;
         } catch (const ReadFailure& failure) {
             unread.add(failure.what());
         } catch (const std::bad_alloc&) {
@@ -253,12 +265,15 @@ std::vector<Check> check_sidecars(const std::filesystem::path& folder, const Lis
     }
     if (count == 0) return {};
     if (bad.none() && !unread.none()) return {unread.not_done("sidecars")};
-    const char* found = compared == count ? "box, axes, levels, names, types, scale, place, times and "
+    std::string found = compared == count ? "box, axes, levels, names, types, scale, place, times and "
                                             "figures of frames are those of list and "
                                             "sources"
                                           : "names, types, scale and numbers of frames are those of the "
                                             "list; not all of box, axes, levels, place, times and "
                                             "figures was compared: sources are not there, or have changed";
+    if (untold > 0)
+        found += fmt::format("; times of {} of {} frames were not compared: their sources say of none",
+                             untold, frames);
     std::vector<Check> checks{bad.check("sidecars", found)};
     if (!unread.none()) checks.push_back(unread.not_done("sources of sidecars"));
     return checks;

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -66,6 +67,31 @@ TEST_F(Files, PathsGoBackThroughLinksAsTheSystemDoes) {
     // A link that leads nowhere else is none to think of.
     fs::create_directory_symlink("real", folder / "same");
     EXPECT_EQ(normal_path(folder / "same/../x"), folder / "x");
+}
+
+TEST_F(Files, AFileIsReachedThroughEachOfItsLinks) {
+    const fs::path file = write("disk/x", "x");
+    EXPECT_EQ(paths_to(file), std::vector{file});
+    fs::create_directories(folder / "run");
+    fs::create_directories(folder / "desk");
+    fs::create_directory_symlink("../disk", folder / "run/density");
+    fs::create_symlink("../run/density/x", folder / "desk/short");
+    fs::create_symlink(folder / "desk/short", folder / "desk/whole");
+    const std::vector<fs::path> paths = paths_to(folder / "desk/whole");
+    EXPECT_EQ(paths, (std::vector{folder / "desk/whole", folder / "desk/short",
+                                  folder / "desk/../run/density/x", folder / "desk/../run/../disk/x"}));
+    for (const fs::path& path : paths) EXPECT_TRUE(is_same_place(path, file)) << path;
+    // Each folder above is one that the system knows by that path.
+    EXPECT_EQ(holder_of(paths[2]), folder / "desk/../run/density");
+    EXPECT_EQ(holder_of(holder_of(paths[2])), folder / "desk/../run");
+    EXPECT_EQ(holder_of("x"), ".");
+    EXPECT_EQ(holder_of("."), "./..");
+    EXPECT_EQ(holder_of("a/.."), "a/../..");
+    EXPECT_EQ(holder_of("a/b/"), "a");
+    EXPECT_TRUE(is_same_place(holder_of("/"), "/"));
+    fs::create_symlink("circle", folder / "circle");
+    EXPECT_LE(paths_to(folder / "circle").size(), 41U);
+    EXPECT_EQ(paths_to(folder / "nothere/x").size(), 1U);
 }
 
 TEST_F(Files, FoldersAreCreatedWithThoseAboveThem) {

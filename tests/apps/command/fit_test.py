@@ -71,6 +71,9 @@ class Fit(Case):
         before = (self.folder / "fit/wave-1/timing.csv").read_text()
         self.assertEqual(self.call("fit", file, "--out", "fit", "-j", "1").stdout, result.stdout)
         self.assertEqual((self.folder / "fit/wave-1/timing.csv").read_text(), before)
+        for name in ("fit.json", "fitted.toml", "posterior.csv"):
+            self.refused(2, "state", "null.toml", "--steps", "1", "--out", f"fit/{name}", says=f"fit/{name}: is a file of the fit in ")
+        self.refused(2, "state", "null.toml", "--steps", "1", "--out", "fit/wave-1/points.csv", says="is a file of the sweep in ")
 
     def test_the_fitted_scene_finds_its_files(self):
         self.write("null.toml", NULL)

@@ -82,13 +82,26 @@ class State(Case):
         (self.folder / "out/density").symlink_to("../disk/density")
         shutil.move(self.folder / "exported/tiny_0002.vdb", self.folder / "disk/away.vdb")
         (self.folder / "exported/tiny_0002.vdb").symlink_to("../disk/away.vdb")
-        for file in ("out/density/tiny_0002.vdb", "exported/tiny_0002.vdb"):
+        # Links to what links lead on from, and ".." behind a link.
+        (self.folder / "links").mkdir()
+        for name, target in (("chain.vdb", "../exported/tiny_0002.vdb"), ("frame.vdb", "../out/density/tiny_0002.vdb"), ("density", "../out/density"),
+                             ("out", "../out"), ("again.vdb", "chain.vdb"), ("whole.vdb", self.folder / "out/density/tiny_0002.vdb")):
+            (self.folder / "links" / name).symlink_to(target)
+        for file in ("out/density/tiny_0002.vdb", "exported/tiny_0002.vdb", "links/chain.vdb", "links/frame.vdb", "links/density/tiny_0002.vdb",
+                     "links/out/../out/density/tiny_0002.vdb", "links/again.vdb", "links/whole.vdb"):
             self.refused(2, "state", self.scene, "--steps", "1", "--out", file, says=f"{file}: is a file of the ")
         # A frame that is written, and not listed yet.
         manifest = self.folder / "out/manifest.json"
         text = manifest.read_text()
         manifest.write_text(unsealed({**json.loads(text), "complete": False, "frames": []}))
         self.refused(2, "state", self.scene, "--steps", "1", "--out", "out/density/tiny_0002.vdb", says="is a file of the run in ")
+        for file in ("links/frame.vdb", "links/density/tiny_0002.vdb"):
+            self.refused(2, "state", self.scene, "--steps", "1", "--out", file, says="is a file of the run in ")
+        (self.folder / "out/mine").mkdir()
+        for file in ("out/mine/tiny_0002.vdb", "out/density/tiny_0100.vdb"):  # no frame of it
+            for _ in range(2):
+                self.call("state", self.scene, "--steps", "1", "-q", "--out", file)
+            (self.folder / file).unlink()
         manifest.write_text(text)
         for _ in range(2):  # what the run does not list may be replaced
             self.call("state", self.scene, "--steps", "1", "--out", "out/density/state.vdb", "-q")

@@ -54,6 +54,22 @@ class InterruptedExport(Case):
                 self.assertEqual({file.name: file.read_bytes() for file in out.iterdir()}, {file.name: file.read_bytes() for file in whole.iterdir()}, out)
                 shutil.rmtree(out)
 
+    def test_files_of_a_killed_export_are_kept(self):
+        """By what writes single files, before they are listed; but a file of somebody in such a place is theirs."""
+        scene = self.folder / "placed.toml"
+        self.killed("rename", 3, "out/placed_", "--to", "vdb", "-o", "out", "-j", "1")
+        made = sorted((self.folder / "out").glob("placed_*.vdb"))
+        self.assertTrue(made)
+        for file in made:
+            before = file.read_bytes()
+            self.refused(2, "state", scene, "--steps", "1", "--out", file, says="is a file of the export in ")
+            self.assertEqual(file.read_bytes(), before)
+        made[0].write_bytes(b"mine")
+        self.call("state", scene, "--steps", "1", "-q", "--out", made[0])
+        made[0].unlink()
+        self.call("export", "run", "--to", "vdb", "-o", "out")
+        self.call("verify", "out")
+
     def test_a_killed_export_takes_no_file_of_others_for_its_own(self):
         """Volumes, texts and weather that somebody put where it had not come to, as a file or a link, stay, however often it is called."""
         arguments = ["--to", "raw", "--to", "layers", "-o", "out"]

@@ -466,6 +466,25 @@ class Keeping(Case):
         self.kept("out", 2, *run, "--overwrite", *low, says=says)
         self.assertIn(says, self.call("validate", scene, *low, status=2).stderr)
         self.refused(2, "run", scene, "--splatting", "cpu", "--out", "new", *low, says=says)
+        for height in ("0", "-5"):  # which no heights of the ground are needed for
+            low = ("--set", "camera.above_ground=true", "--set", f"camera.position_m=[500,500,{height}]")
+            says = f"camera: the position is {height} m above the ground; expected more than 0"
+            self.kept("out", 2, *run, "--overwrite", *low, says=says)
+            self.assertIn(says, self.call("validate", scene, *low, status=2).stderr)
+
+    @unittest.skipUnless(os.geteuid() == 0 and shutil.which("setpriv"), "only root becomes another user")
+    def test_a_file_below_a_folder_of_others(self):
+        """Who may not look into a folder above has no run there: a file is replaced as anywhere else."""
+        os.chmod(self.folder, 0o755)
+        folder = self.folder / "closed/mine"
+        folder.mkdir(parents=True)
+        shutil.copy(self.folder / self.scene, folder / "scene.toml")
+        os.chown(folder, 65534, 65534)
+        (self.folder / "closed").chmod(0o700)
+        for _ in range(2):
+            state = subprocess.run(["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups", NEPHOS, "state", "scene.toml", "--steps", "1", "-q", "-o",
+                                    "x.vdb"], cwd=folder, env=self.environment, capture_output=True, text=True)
+            self.assertEqual(state.returncode, 0, state.stderr)
 
     def test_files_that_a_call_reads(self):
         self.call(*self.plain, "--out", "out")

@@ -177,6 +177,21 @@ files = ["written/density/written_0001.vdb"]
         self.call("merge", "here", "there", "--out", "other", "--overwrite")
         self.assertEqual((self.folder / "other/sweep.toml").read_bytes(), plan)
 
+    def test_its_files_are_not_replaced(self):
+        """By what writes single files, also through links; files of others beside them are."""
+        self.sweep("out", steps="20", axis="field.background.ext=0.05")
+        files = sorted(path for path in (self.folder / "out").rglob("*") if path.is_file())
+        before = {path: path.read_bytes() for path in files}
+        self.assertTrue({"runs.csv", "points.csv", "failures.csv", "series.nc", "timing.csv", "scene.toml", "sweep.toml", "manifest.json", "lock",
+                         "0000-of-0001.jsonl", "0000-of-0001.series"} <= {path.name for path in files})
+        (self.folder / "link").symlink_to("out/points.csv")
+        for file in (*files, self.folder / "link"):
+            self.refused(2, "state", self.scene, "--steps", "1", "--out", file, says="is a file of the sweep in ")
+        self.assertEqual(before, {path: path.read_bytes() for path in files})
+        for mine in ("out/mine.vdb", "points.csv"):
+            for _ in range(2):
+                self.call("state", self.scene, "--steps", "1", "-q", "--out", mine)
+
     def test_records_of_another_sweep_are_not_left_out_in_silence(self):
         self.sweep("one", steps="100")
         other = self.write("other.toml", NULL.replace("act = 0.002", "act = 0.003"))
