@@ -140,6 +140,8 @@ PublishCheck::~PublishCheck() { publish_check = before_; }
 
 AtomicFile::AtomicFile(const std::filesystem::path& given, Access access, Folders folders)
     : path_(target_of(given)), name_(path_.filename().string()) {
+    if (name_.empty() || name_ == "." || name_ == "..")
+        throw Error(ErrorCode::usage, path_.string() + ": is the name of a folder: expected that of a file");
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
     check_before_publishing();
     if (folders == Folders::made) create_folders(folder);

@@ -61,12 +61,14 @@ void require_regular_file(const std::filesystem::path& path);
 // Opens a regular file to read from it. Throws as open_regular_file().
 std::ifstream open_stream(const std::filesystem::path& path);
 
-// A file that is there and cannot be read, which says nothing of its content: "PATH: cannot read: Input/output error".
+// A file that is there and cannot be read, which says nothing of its content: "PATH: cannot read: Input/output error"; or what it takes
+// to read it is not to be had.
 class ReadFailure : public Error {
   public:
     // `act`: what failed, as "open".
     ReadFailure(const std::filesystem::path& path, const std::string& reason, const std::string& act = "read")
         : Error(ErrorCode::io, path.string() + ": cannot " + act + ": " + reason) {}
+    explicit ReadFailure(const std::string& message) : Error(ErrorCode::io, message) {}
 };
 
 // Throws ReadFailure when reading from the stream of a file has just failed; its end is no failure.

@@ -96,7 +96,7 @@ bool OwnFiles::is_own_path(const std::filesystem::path& file) const {
 
 std::optional<std::filesystem::path> OwnFiles::own_path(const std::filesystem::path& file) const {
     if (is_own_path(file)) return file;
-    const std::optional<FileIdentity> place = identity_behind(file.parent_path());
+    const std::optional<FileIdentity> place = identity_behind(holder_of(file));
     if (!place) return std::nullopt;
     const auto [begin, end] = folders_.equal_range(*place);
     for (auto folder = begin; folder != end; ++folder)

@@ -114,6 +114,8 @@ RunListing read_run(const std::filesystem::path& folder) {
     }
     try {
         run.scene = scene_of_texts(text, given, path);
+    } catch (const ReadFailure&) {
+        throw;
     } catch (const Error& error) {
         throw Error(ErrorCode::io, path.string() + ": its scene cannot be read: " + error.what());
     }

@@ -174,12 +174,7 @@ void require_cameras_above(const Scene& scene, const HeightMap* terrain, int fir
     RenderOptions options = scene.render;
     for (int number = first_frame; number <= (camera.path.empty() ? first_frame : last_frame); ++number) {
         const double time_s = frame_time_s(scene.frames, number - 1);
-        const double height_m = camera_at(camera, time_s).position_m.z;
-        if (camera.above_ground && !(height_m > 0))
-            throw Error(ErrorCode::usage,
-                        fmt::format("camera: the position is {} m above the ground; expected more than 0, or "
-                                    "camera.above_ground = false, by which heights are those of the world",
-                                    number_text(height_m, 6)));
+        require_above_ground(camera, time_s);
         if (terrain == nullptr) continue;
         options.camera = standing_camera(camera, terrain, scene.render.ground, time_s);
         require_above_terrain(*terrain, options);

@@ -246,6 +246,7 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
                                     std::span<const DrawnVeil> veils) {
     check(moving);
     RenderOptions options = moving;
+    if (terrain_) require_above_ground(moving.camera, time_s);
     options.camera = camera(moving, time_s);
     options.sun = sun_at(moving.sun, time_s);
     const bool rain = options.precipitation.enabled && !weather.curtains.empty();

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "study/report.h"
 #include "study/shard_files.h"
 #include "study/sweep_plan.h"
 #include <fmt/format.h>
@@ -73,14 +74,23 @@ bool is_foreign(const fs::path& file, const std::function<bool()>& is_ours) {
     return true;
 }
 
-// Returns whether a file is called and begins like one of the tables in a sweep's folder.
-bool is_table_of_sweep(const fs::path& file) {
+// Returns whether a folder holds records or tables of a sweep, or its plan and scene.
+bool is_sweep_folder(const fs::path& folder) {
+    return has_shards(folder) || begins_with(folder / "manifest.json", kSweepManifest) ||
+           (begins_with(folder / "scene.toml", kWrittenBySweep) &&
+            begins_with(folder / "sweep.toml", kWrittenBySweep));
+}
+
+// Returns whether a file is called and begins like one of those in a sweep's folder.
+bool is_named_by_sweep(const fs::path& file) {
     const std::string name = file.filename().string();
+    const auto is_named = [&](const auto& named) {
+        return named.first == name && (begins_with(file, named.second) || is_unmarked(holder_of(file), name));
+    };
     if (name == "timing.csv") return true;
     if (name == "series.nc") return is_series_of_sweep(file);
-    return std::ranges::any_of(kTables, [&](const auto& table) {
-        return table.first == name && (begins_with(file, table.second) || is_unmarked(holder_of(file), name));
-    });
+    if (name == "report.html") return begins_with(file, kReportBeginning);
+    return std::ranges::any_of(kTables, is_named) || std::ranges::any_of(kSweepScripts, is_named);
 }
 
 }  // namespace
@@ -127,9 +137,7 @@ std::optional<fs::path> sweep_with_file(const fs::path& file) {
             const fs::path sweep = holder_of(folder);
             if (is_same_place(sweep / "shards", folder) && has_shards(sweep)) return sweep;
         }
-        if (is_table_of_sweep(path) &&
-            (has_shards(folder) || begins_with(folder / "manifest.json", kSweepManifest)))
-            return folder;
+        if (is_named_by_sweep(path) && is_sweep_folder(folder)) return folder;
     }
     return {};
 }
@@ -141,7 +149,9 @@ std::optional<fs::path> fit_with_file(const fs::path& file) {
         const fs::path folder = holder_of(path);
         const bool is_result = name == "fit.json" || name == "posterior.csv" ||
                                (name == "fitted.toml" && begins_with(path, kWrittenByFit));
-        if (is_result && begins_with(folder / "fit.json", kFit)) return folder;
+        // One that was killed has no fit.json yet.
+        if (is_result && (begins_with(folder / "fit.json", kFit) || is_sweep_folder(folder / "wave-1")))
+            return folder;
     }
     return {};
 }

@@ -6,11 +6,19 @@
 #include <filesystem>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 namespace nephos {
 
 // The title of a sweep's series.nc, and the first line of a fit's scene; kWrittenBySweep is that of a sweep's TOML.
 inline constexpr std::string_view kSweepTitle = "nephos sweep", kWrittenByFit = "# Written by nephos fit.\n";
+
+// What `nephos sweep --emit` writes, and how it begins.
+inline constexpr std::pair<std::string_view, std::string_view> kSweepScripts[] = {
+    {"sweep.slurm", "#!/bin/bash\n# Runs a sweep in "},
+    {"Snakefile", "# Runs a sweep in "},
+    {"sweep.parallel", "\"${NEPHOS:-nephos}\" sweep sweep.toml --shard "},
+};
 
 // Throws Error(usage) that names a file in the folder which a sweep would replace and no sweep wrote, as a scene or a plan
 // of the user's own, or what a run left. Each file tells by its beginning, beside records, too. Thread-safe.

@@ -56,11 +56,13 @@ bool accept(Editor& editor, const fs::path& path) {
                 ask_before(editor, Pending::open, path);
                 return true;
             case FileDialog::save_as:
-                if (!editor.document->has_file() || !is_same_place(path, editor.document->path()))
+                if (!editor.document->has_file() || !is_same_place(path, editor.document->path())) {
+                    refuse_to_replace_listed_file(path);
                     for_each_scene(editor, [&](const OpenScene& open) {
                         if (const Scene* const scene = open.document->current_scene())
                             refuse_to_replace_files_of(*scene, path);
                     });
+                }
                 editor.document->save_as(path);
                 note_recent(editor.settings, path);
                 keep_settings(editor);

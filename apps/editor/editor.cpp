@@ -344,6 +344,7 @@ std::string kept_edits(Editor& editor) {
 }  // namespace
 
 void refuse_own_files(Editor& editor, const std::filesystem::path& file, bool was_asked) {
+    refuse_to_replace_listed_file(file);
     for_each_scene(editor, [&](const OpenScene& open) {
         const SceneDocument& document = *open.document;
         if (document.has_file()) refuse_to_replace(document.path(), file);

@@ -63,10 +63,7 @@ Engine parse_engine(const std::string& text) {
 
 std::string emit_sweep(const SweepPlan& plan, Engine engine, std::uint32_t shards,
                        const std::filesystem::path& folder) {
-    constexpr std::string_view kScripts[][2] = {{"sweep.slurm", "#!/bin/bash\n# Runs a sweep in "},
-                                                {"Snakefile", "# Runs a sweep in "},
-                                                {"sweep.parallel", kProgram}};
-    for (const auto& [name, beginning] : kScripts) require_own(folder / name, beginning, "a sweep");
+    for (const auto& [name, beginning] : kSweepScripts) require_own(folder / name, beginning, "a sweep");
     write_plan(plan, folder);
     const std::string go = fmt::format("cd -- {}\n", shell_word(folder.string()));
     switch (engine) {

@@ -297,6 +297,18 @@ MeanSlope mean_slope(const HeightMap& map, double x_m, double y_m, double footpr
     return {a.x + part * (b.x - a.x), a.y + part * (b.y - a.y)};
 }
 
+void require_above_ground(const Camera& camera, double time_s) {
+    const double height_m = camera_at(camera, time_s).position_m.z;
+    if (!camera.above_ground || height_m > 0) return;
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "camera: the position is %g m above the ground; expected more than 0, or camera.above_ground = "
+        "false, by which heights are those of the world",
+        height_m);
+    throw Error(ErrorCode::usage, text);
+}
+
 void require_above_terrain(const HeightMap& map, const RenderOptions& options) {
     const Vec3& eye = options.camera.position_m;
     const double ground = ground_height_at(&map, options.ground, eye.x, eye.y);

@@ -95,6 +95,9 @@ struct MeanSlope {
 };
 MeanSlope mean_slope(const HeightMap& map, double x_m, double y_m, double footprint_m);
 
+// Throws Error(usage) when a camera whose heights are counted from the ground lies in it at a time, whatever its height there is.
+void require_above_ground(const Camera& camera, double time_s);
+
 // Throws Error(usage) when the camera is not above ground and map.
 void require_above_terrain(const HeightMap& map, const RenderOptions& options);
 

@@ -313,11 +313,12 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                                 take_moment(loaded, frame);
                                 if (loaded.metadata) winds.add(frame.time_s, loaded.metadata->wind);
                                 if (s.of_nephos && !loaded.metadata)
-                                    notes.push_back(fmt::format(
-                                        "{}: says of no moment, unlike the first file: it is "
-                                        "given that {}, {:g} s",
-                                        frame.file.string(),
-                                        is_of_run ? "of its run's manifest" : "of that one", frame.time_s));
+                                    notes.push_back(
+                                        fmt::format("{}: says of no moment, unlike the first file: it is "
+                                                    "given {}, {:g} s",
+                                                    frame.file.string(),
+                                                    is_of_run ? "that of its run's manifest" : "that one's",
+                                                    frame.time_s));
                                 for (const std::string& note : loaded.notes)
                                     notes.push_back(frame.file.string() + ": " + note);
                                 work.add([&, read] {

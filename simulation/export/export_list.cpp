@@ -151,20 +151,28 @@ bool is_export_folder(const std::filesystem::path& folder) {
 
 namespace {
 
-// Those that are listed, and those that an export at work, or one that was killed, has made since.
-std::vector<ExportedFile> known_files(const std::filesystem::path& folder) {
-    std::vector<ExportedFile> files = noted_files(folder);
-    std::erase_if(files, [&](const ExportedFile& file) {
-        return type_behind(folder / file.path) != std::filesystem::file_type::regular ||
-               !(file_digest(folder / file.path) == file.digest);
-    });
+// Returns whether an export lists the file.
+bool is_listed(const std::filesystem::path& folder, const std::filesystem::path& file) {
     try {
-        for (ExportedFile& file : read_export(folder).files) files.push_back(std::move(file));
+        return std::ranges::any_of(read_export(folder).files, [&](const ExportedFile& listed) {
+            return is_same_place(folder / listed.path, file);
+        });
     } catch (const ReadFailure&) {
         throw;
     } catch (const Error&) {  // damaged, or of another version: then it lists nothing
+        return false;
     }
-    return files;
+}
+
+// Returns whether an export at work, or one that was killed, has made the file and not listed it yet; of another user, who alone may
+// look into the notes, it is not known.
+bool is_noted(const std::filesystem::path& folder, const std::filesystem::path& file) {
+    std::error_code error;
+    const auto type = std::filesystem::symlink_status(notes_of(folder), error).type();
+    if (type == std::filesystem::file_type::none && error == std::errc::permission_denied) return false;
+    return std::ranges::any_of(noted_files(folder), [&](const ExportedFile& noted) {
+        return is_same_place(folder / noted.path, file) && file_digest(file) == noted.digest;
+    });
 }
 
 }  // namespace
@@ -173,10 +181,11 @@ std::optional<std::filesystem::path> export_with_file(const std::filesystem::pat
     if (type_behind(file) != std::filesystem::file_type::regular) return {};
     for (const std::filesystem::path& path : paths_to(file)) {
         const std::filesystem::path folder = holder_of(path);
+        if (folder.filename() == kExportWork && path.filename() == notes_of(folder).filename())
+            return holder_of(folder);
         if (!is_export_folder(folder)) continue;
         if (is_same_place(folder / "export.json", path)) return folder;
-        for (const ExportedFile& known : known_files(folder))
-            if (is_same_place(folder / known.path, path)) return folder;
+        if (is_listed(folder, path) || is_noted(folder, path)) return folder;
     }
     return {};
 }

@@ -66,8 +66,10 @@ Json export_entry(const ExportedFile& file) {
     return entry;
 }
 
+std::filesystem::path notes_of(const std::filesystem::path& folder) { return folder / kExportWork / kNotes; }
+
 std::vector<ExportedFile> noted_files(const std::filesystem::path& folder) {
-    const std::filesystem::path work = folder / kExportWork, path = work / kNotes;
+    const std::filesystem::path work = folder / kExportWork, path = notes_of(folder);
     std::vector<ExportedFile> files;
     if (type_at(work) != std::filesystem::file_type::directory ||
         type_at(path) != std::filesystem::file_type::regular)

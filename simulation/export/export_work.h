@@ -24,6 +24,9 @@ inline constexpr const char* kExportWork = ".nephos-export";
 // Returns the entry of a file in a list.
 nlohmann::ordered_json export_entry(const ExportedFile& file);
 
+// Returns the file of its notes, which is its user's alone.
+std::filesystem::path notes_of(const std::filesystem::path& folder);
+
 // Returns the files that an export which was killed has noted, in their order: a later one of a name is the newer. Whether they got
 // their places is not known. Lines that are torn or damaged are left out.
 std::vector<ExportedFile> noted_files(const std::filesystem::path& folder);

@@ -124,12 +124,12 @@ void check_box(const CheckedJson& json, const nlohmann::ordered_json& parsed,
         "layer",    "quantity", "offset",          "extinction_per_m", "size",  "order",  "axes",
         "unit",     "max_m",    "handedness",      "voxel_size_m",     "min_m", "sample", "border",
         "period_m", "padding",  "half_voxel_shift"};
-    constexpr std::string_view kTimes[] = {"first_s", "frames_per_second", "time_scale"},
+    constexpr std::string_view kRates[] = {"frames_per_second", "time_scale"},
                                kPlace[] = {"latitude_deg",   "longitude_deg", "height_m",   "height_datum",
                                            "geoid_height_m", "heading_deg",   "projection", "start_utc"},
                                kSource[] = {"scene_hash", "seed", "nephos_version"};
     check_values(json, parsed, expected, kKeys);
-    check_object(json, parsed, expected, "time", kTimes);
+    check_object(json, parsed, expected, "time", kRates);
     check_object(json, parsed, expected, "source", kSource);
     check_object(json, parsed, expected, "georeference", kPlace);
     if (expected.contains("georeference"))
@@ -221,13 +221,16 @@ Compared check_sidecar(const std::filesystem::path& folder, const std::filesyste
         if (n == 0) check_box(json, parsed, expected);
         const nlohmann::ordered_json &frame = parsed.at("frames").at(n),
                                      &of_source = expected.at("frames").front();
-        constexpr std::string_view kFigures[] = {"sum", "max"}, kTime[] = {"time_s", "utc"};
+        constexpr std::string_view kFigures[] = {"sum", "max"}, kTime[] = {"time_s", "utc"},
+                                   kFirst[] = {"first_s"};
         check_values(frames[n], frame, of_source, kFigures);
         // A file of another program has the time of the first, or that of its run's manifest.
-        if (source->metadata)
-            check_values(frames[n], frame, of_source, kTime);
-        else
+        if (!source->metadata) {
             ++compared.untold;
+            continue;
+        }
+        check_values(frames[n], frame, of_source, kTime);
+        if (n == 0) check_values(json.at("time"), parsed.at("time"), expected.at("time"), kFirst);
     }
     return compared;
 }
@@ -265,15 +268,18 @@ std::vector<Check> check_sidecars(const std::filesystem::path& folder, const Lis
     }
     if (count == 0) return {};
     if (bad.none() && !unread.none()) return {unread.not_done("sidecars")};
-    std::string found = compared == count ? "box, axes, levels, names, types, scale, place, times and "
-                                            "figures of frames are those of list and "
-                                            "sources"
-                                          : "names, types, scale and numbers of frames are those of the "
-                                            "list; not all of box, axes, levels, place, times and "
-                                            "figures was compared: sources are not there, or have changed";
-    if (untold > 0)
-        found += fmt::format("; times of {} of {} frames were not compared: their sources say of none",
-                             untold, frames);
+    std::string found =
+        compared < count
+            ? "names, types, scale and numbers of frames are those of the list; not all of box, axes, "
+              "levels, place, times and figures was compared: sources are not there, or have changed"
+        : untold > 0
+            ? fmt::format(
+                  "box, axes, levels, names, types, scale, place and figures of frames are those of "
+                  "list and sources, and so are times, but for {} of {} frames, whose sources "
+                  "say of none",
+                  untold, frames)
+            : "box, axes, levels, names, types, scale, place, times and figures of frames are those of "
+              "list and sources";
     std::vector<Check> checks{bad.check("sidecars", found)};
     if (!unread.none()) checks.push_back(unread.not_done("sources of sidecars"));
     return checks;

@@ -7,6 +7,7 @@ flags of each preset (CMakePresets.json), and under Valgrind. With NEPHOS_TEST_A
 import json
 import os
 import pathlib
+import shlex
 import shutil
 import subprocess
 import sys
@@ -42,7 +43,7 @@ veil = { form = "cirrus" }
 
 def presets():
     """Cache variables of each preset, with what it inherits."""
-    named = {preset["name"]: preset for preset in json.loads((SOURCE / "CMakePresets.json").read_text())["configurePresets"]}
+    named = {preset["name"]: preset for preset in json.loads((SOURCE / "CMakePresets.json").read_text().replace("${sourceDir}", str(SOURCE)))["configurePresets"]}
 
     def variables(name):
         preset = named[name]
@@ -78,7 +79,7 @@ class Sanitizers(unittest.TestCase):
                 with self.subTest(preset=preset):
                     self.skipTest(f"{compiler} is not installed")
                 continue
-            flags = (variables["CMAKE_CXX_FLAGS"] + " " + variables["CMAKE_CXX_FLAGS_DEBUG"]).split()
+            flags = shlex.split(variables["CMAKE_CXX_FLAGS"] + " " + variables["CMAKE_CXX_FLAGS_DEBUG"])
             program = self.compiled(preset, compiler, flags)
             for fault, message in faults.items():
                 with self.subTest(preset=preset, fault=fault):

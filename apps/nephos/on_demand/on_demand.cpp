@@ -15,7 +15,7 @@
 #include <sys/auxv.h>
 #include <sys/mman.h>
 
-#include "core/error.h"
+#include "core/descriptor.h"
 
 extern "C" {
 // Both of nephos_on_demand_count elements, from functions.S: addresses that calls jump to, and symbols.
@@ -44,7 +44,7 @@ void* wait_for_unlock(void* lock) {
 
 // A library of OpenVDB's, liblog4cplus, starts four threads while it is loaded, and TBB two at least at its first work. Where
 // the limits of a user or of memory allow fewer, they end the process or wait for ever: so as many are tried first, with
-// the addresses that the libraries take (70 MiB with Debian 12). Throws Error(io).
+// the addresses that the libraries take (70 MiB with Debian 12). Throws ReadFailure: no file is damaged.
 void require_room() {
     constexpr std::size_t kAddresses = std::size_t(80) << 20, kThreads = 6;
     void* const addresses =
@@ -64,9 +64,9 @@ void require_room() {
     pthread_mutex_destroy(&lock);
     if (addresses != MAP_FAILED) ::munmap(addresses, kAddresses);
     if (problem != 0)
-        throw Error(ErrorCode::io, std::string("a part of nephos cannot be loaded: it needs ") +
-                                       std::to_string(kThreads) + " threads and 80 MiB of addresses: " +
-                                       std::strerror(problem) + " (see the limits of `ulimit -a`)");
+        throw ReadFailure(std::string("a part of nephos cannot be loaded: it needs ") +
+                          std::to_string(kThreads) + " threads and 80 MiB of addresses: " +
+                          std::strerror(problem) + " (see the limits of `ulimit -a`)");
 }
 
 // RTLD_NOW, because files are read in processes that may open nothing, so no symbol may be looked up there.
@@ -75,12 +75,12 @@ void load_volumes() {
     const std::filesystem::path file = program_file().parent_path() / NEPHOS_VOLUMES_LIBRARY;
     void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
-        throw Error(ErrorCode::io, std::string("a part of nephos cannot be loaded: ") + dlerror());
+        throw ReadFailure(std::string("a part of nephos cannot be loaded: ") + dlerror());
     }
     for (std::size_t i = 0; i < nephos_on_demand_count; ++i) {
         void* const function = dlsym(library, nephos_on_demand_names[i]);
         if (function == nullptr) {
-            throw Error(ErrorCode::io, std::string("a part of nephos is of another version: ") + dlerror());
+            throw ReadFailure(std::string("a part of nephos is of another version: ") + dlerror());
         }
         nephos_on_demand_slots[i] = function;
     }

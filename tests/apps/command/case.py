@@ -108,9 +108,9 @@ class Case(unittest.TestCase):
         path.write_text(text)
         return str(path)
 
-    def call(self, *arguments, status=0, env=None, **options):
+    def call(self, *arguments, status=0, env=None, cwd=None, **options):
         """Runs the command; checks its exit status."""
-        result = subprocess.run([NEPHOS, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True,
+        result = subprocess.run([NEPHOS, *map(str, arguments)], cwd=cwd or self.folder, capture_output=True, text=True,
                                 env={**self.environment, **(env or {})}, timeout=900 if SANITIZED else 120, **options)
         self.assertEqual(result.returncode, status, f"{arguments}\n{result.stdout}\n{result.stderr}")
         return result

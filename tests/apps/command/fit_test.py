@@ -74,6 +74,8 @@ class Fit(Case):
         for name in ("fit.json", "fitted.toml", "posterior.csv"):
             self.refused(2, "state", "null.toml", "--steps", "1", "--out", f"fit/{name}", says=f"fit/{name}: is a file of the fit in ")
         self.refused(2, "state", "null.toml", "--steps", "1", "--out", "fit/wave-1/points.csv", says="is a file of the sweep in ")
+        (self.folder / "fit/fit.json").unlink()  # as after a kill
+        self.refused(2, "state", "null.toml", "--steps", "1", "--out", "fit/fitted.toml", says="is a file of the fit in ")
 
     def test_the_fitted_scene_finds_its_files(self):
         self.write("null.toml", NULL)

@@ -76,6 +76,15 @@ class State(Case):
         self.refused(2, "render", "out/density/tiny_0003.vdb", "--out", "exported/tiny_0002.png", "--splatting", "cpu",
                      says="exported/tiny_0002.png: is a file of the export in ")
         self.assertEqual(contents(), before)
+        self.refused(2, "state", self.scene, "--steps", "1", "--out", "x.vdb/", says="x.vdb/: is the name of a folder")
+        self.assertFalse((self.folder / "x.vdb").exists())
+        # From inside of a run that is not complete.
+        shutil.copytree(self.folder / "out", self.folder / "bare")
+        manifest = self.folder / "bare/manifest.json"
+        manifest.write_text(unsealed({**json.loads(manifest.read_text()), "complete": False, "frames": []}))
+        (self.folder / "bare/density/own.vdb").symlink_to("tiny_0002.vdb")
+        for folder, file in (("density", "tiny_0002.vdb"), ("density", "./tiny_0002.vdb"), ("density", "own.vdb"), (".", "statistics.csv")):
+            self.refused(2, "state", self.scene, "--steps", "1", "--out", file, cwd=self.folder / "bare" / folder, says=f"{file}: is a file of the run in ")
         # Folders and files that the user has put elsewhere.
         (self.folder / "disk").mkdir()
         shutil.move(self.folder / "out/density", self.folder / "disk/density")

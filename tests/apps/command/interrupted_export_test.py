@@ -64,6 +64,15 @@ class InterruptedExport(Case):
             before = file.read_bytes()
             self.refused(2, "state", scene, "--steps", "1", "--out", file, says="is a file of the export in ")
             self.assertEqual(file.read_bytes(), before)
+        self.refused(2, "state", scene, "--steps", "1", "--out", "out/.nephos-export/notes.jsonl", says="is a file of the export in ")
+        if os.geteuid() == 0 and shutil.which("setpriv"):  # of another user, who may not look into the notes
+            self.folder.chmod(0o755)
+            (self.folder / "out").chmod(0o777)
+            for _ in range(2):
+                state = subprocess.run(["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups", NEPHOS, "state", scene, "--steps", "1", "-q", "-o",
+                                        "out/theirs.vdb"], cwd=self.folder, env=self.environment, capture_output=True, text=True)
+                self.assertEqual(state.returncode, 0, state.stderr)
+            (self.folder / "out/theirs.vdb").unlink()
         made[0].write_bytes(b"mine")
         self.call("state", scene, "--steps", "1", "-q", "--out", made[0])
         made[0].unlink()

@@ -45,9 +45,9 @@ class Keeping(Case):
     def files(self, folder):
         return {path: path.read_bytes() for path in (self.folder / folder).rglob("*") if path.is_file()}
 
-    def kept(self, folder, status, *arguments, says):
+    def kept(self, folder, status, *arguments, says, **options):
         before = self.files(folder)
-        self.refused(status, *arguments, says=says)
+        self.refused(status, *arguments, says=says, **options)
         self.assertEqual(self.files(folder), before)
 
     def test_a_foreign_table_of_a_layer(self):
@@ -64,6 +64,13 @@ class Keeping(Case):
         table.write_text("mine\n")
         (self.folder / "out/checkpoint.nephos").unlink()
         self.kept("out", 2, "run", scene, "--out", "out", "--resume", says="statistics/low.csv")
+
+    def test_a_lack_of_means_says_nothing_of_a_manifest(self):
+        """It takes a part of nephos to read the scene of veils in it."""
+        self.call("run", self.write("layered.toml", LAYERED), "--out", "out")
+        failing = {"LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "mmap ENOMEM 1 1", "FAIL_PROGRAM": "nephos"}
+        self.kept("out", 3, "metar", "METAR LOWW 241250Z 30012KT 9999 FEW040 12/05 Q1020", "-o", "out/statistics.csv", "--overwrite", "-j", "1", env=failing,
+                  says="a part of nephos cannot be loaded")
 
     def test_resuming_without_a_checkpoint_keeps_what_starting_keeps(self):
         self.call(*self.plain, "--out", "out")

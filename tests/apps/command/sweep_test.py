@@ -188,6 +188,12 @@ files = ["written/density/written_0001.vdb"]
         for file in (*files, self.folder / "link"):
             self.refused(2, "state", self.scene, "--steps", "1", "--out", file, says="is a file of the sweep in ")
         self.assertEqual(before, {path: path.read_bytes() for path in files})
+        self.call("report", "out")
+        self.refused(2, "state", self.scene, "--steps", "1", "--out", "out/report.html", says="is a file of the sweep in ")
+        for engine, script in (("slurm", "sweep.slurm"), ("snakemake", "Snakefile"), ("parallel", "sweep.parallel")):
+            self.sweep(engine, "--emit", engine, steps="20")
+            for name in ("sweep.toml", "scene.toml", script):  # the only copies of a plan that the command line made
+                self.refused(2, "state", self.scene, "--steps", "1", "--out", f"{engine}/{name}", says="is a file of the sweep in ")
         for mine in ("out/mine.vdb", "points.csv"):
             for _ in range(2):
                 self.call("state", self.scene, "--steps", "1", "-q", "--out", mine)

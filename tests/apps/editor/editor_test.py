@@ -96,6 +96,15 @@ class Window(Case):
             if path == picture:  # the second time the scene has a problem, the third it is no TOML
                 scene.write_text(scene.read_text(encoding="utf-8").replace("seed = ", "seed = -"), encoding="utf-8")
 
+    def test_a_screenshot_replaces_no_file_of_a_run(self):
+        scene = self.scene("cumulus.toml")
+        subprocess.run([NEPHOS, "run", scene, "--statistics-only", "--set", "time.steps=20", "--out", "out", "-q"], cwd=self.folder, check=True)
+        table = self.folder / "out/statistics.csv"
+        before = table.read_bytes()
+        self.assertIn("is a file of the run in ", self.edit(scene, "--screenshot", table, "--after", "0.2", status=2))
+        self.assertIn("is a file of the run in ", self.edit(scene, script="wait-step 1\nhashes out/statistics.csv\n", status=2))
+        self.assertEqual(table.read_bytes(), before)
+
     def test_light_theme_and_large_text(self):
         picture = self.folder / "window.png"
         self.edit("--screenshot", picture, "--after", "3", "--theme", "light", "--scale", "1.5", "--validation")
