@@ -138,10 +138,15 @@ PublishCheck::PublishCheck(const std::function<void()>& check) : before_(publish
 }
 PublishCheck::~PublishCheck() { publish_check = before_; }
 
+void require_file_name(const std::filesystem::path& path) {
+    const std::filesystem::path name = path.filename();
+    if (name.empty() || name == "." || name == "..")
+        throw Error(ErrorCode::usage, path.string() + ": is the name of a folder: expected that of a file");
+}
+
 AtomicFile::AtomicFile(const std::filesystem::path& given, Access access, Folders folders)
     : path_(target_of(given)), name_(path_.filename().string()) {
-    if (name_.empty() || name_ == "." || name_ == "..")
-        throw Error(ErrorCode::usage, path_.string() + ": is the name of a folder: expected that of a file");
+    require_file_name(path_);
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
     check_before_publishing();
     if (folders == Folders::made) create_folders(folder);

@@ -29,6 +29,9 @@ enum class Folders {
     expected,  // an error: their owner has moved or removed them
 };
 
+// Throws Error(usage) for the name of a folder: "a/", "..".
+void require_file_name(const std::filesystem::path& path);
+
 // A file that is written under a temporary name until it is complete. write_atomically() and the functions below it use
 // one. It holds its folder open: no file is renamed into another one that gets the folder's name meanwhile.
 class AtomicFile {
@@ -36,7 +39,7 @@ class AtomicFile {
     // Creates an empty temporary file whose name nobody can foresee beside `path`; missing parent folders as `folders` has
     // it. Symbolic
     // links of this user or of root keep pointing to the new file, also where it is not there yet; one of another user, a
-    // device, a pipe or a folder in the place of the file is refused. Throws Error(io) naming `path`.
+    // device, a pipe or a folder in the place of the file is refused. Throws Error(io) naming `path`, and as require_file_name().
     explicit AtomicFile(const std::filesystem::path& path, Access access = Access::shared,
                         Folders folders = Folders::made);
     // Removes the temporary file unless it was published, unless another was put in its place.

@@ -61,7 +61,8 @@ constexpr std::uint64_t kMostColumns = std::uint64_t(1) << 28;
 CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& options) {
     VdbReadOptions reading;
     reading.grid = options.variable;
-    const DensityGrid grid = load_mask(path, reading).density;
+    const LoadedDensity loaded = load_mask(path, reading);
+    const DensityGrid& grid = loaded.density;
     const double size = grid.placement().cell_size_m;
     if (options.cell_size_m || options.level_height_m)
         fail(ErrorCode::usage, path,
@@ -79,6 +80,10 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
     CloudMasks masks{{}, size, size, {grid.placement().origin_m.z}, options.boundaries, false, 0, {}};
     const double threshold = options.threshold.value_or(0);
     BitPlane& plane = masks.snapshots.emplace_back(extent);
+    if (threshold < 0 && !loaded.notes.empty())
+        fail(ErrorCode::usage, path,
+             fmt::format("{}, and a threshold of {} is below it: expected one of 0 or more",
+                         loaded.notes.front(), threshold));
     if (threshold < 0) {  // so that what is clear is cloud
         plane = plane_of(extent, threshold, [](int, int, int) { return 0.0; });
         return masks;

@@ -17,6 +17,7 @@
 #include "study/transform.h"
 #include <fmt/format.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "scenes/format/named_files.h"
@@ -68,6 +69,8 @@ std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem:
             else
                 table.report("set", problem.message, problem.expected);
         }
+    } catch (const ReadFailure&) {
+        throw;  // which says nothing of the key
     } catch (const Error& error) {
         const bool is_unread = error.code() == ErrorCode::io;
         unread += is_unread;
@@ -294,6 +297,8 @@ void read_target_mask(TomlTable& target, const std::filesystem::path& folder,
         for (const std::string& note : masks.notes)
             if (std::ranges::count(notes, note) == 0) notes.push_back(note);
         mean = mask_statistics(masks).statistics[statistic_index(to.statistic)];
+    } catch (const ReadFailure&) {
+        throw;  // which says nothing of the key
     } catch (const Error& error) {
         unread += error.code() == ErrorCode::io;
         return target.report("from", error.what(), "expected a cloud mask: .vdb, .nc or .png");

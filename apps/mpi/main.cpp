@@ -72,7 +72,7 @@ void simulate(const Arguments& a) {
     if (a.seed) options.seed = *a.seed;
     Ranks ranks(options);
     std::optional<StatisticsTable> table;
-    if (!a.out.empty() && ranks.rank() == 0) table.emplace(a.out, a.overwrite);
+    if (!a.out.empty() && ranks.rank() == 0) table.emplace(a.out, a.overwrite, scene);
     const std::uint64_t steps = a.steps.value_or(scene.steps);
     for (std::uint64_t step = 0;; ++step) {
         std::string hash;

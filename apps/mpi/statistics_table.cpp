@@ -15,6 +15,9 @@
 #include "core/error.h"
 #include "core/paths.h"
 #include "core/text.h"
+#include "scenes/format/named_files.h"
+#include "simulation/export/export.h"
+#include "simulation/run_listing.h"
 
 namespace nephos {
 namespace {
@@ -38,8 +41,21 @@ std::vector<fs::path> earlier_files(const fs::path& folder) {
     return files;
 }
 
+// Throws Error(usage) for a file of a run, an export or the scene.
+void require_nobodys(const fs::path& file, Scene& scene) {
+    const auto refuse = [&](const std::string& whose) {
+        throw Error(ErrorCode::usage, fmt::format("{}: is {}: give another folder", file.string(), whose));
+    };
+    if (const auto run = run_with_file(file)) refuse("a file of the run in " + run->string());
+    if (const auto exported = export_with_file(file)) refuse("a file of the export in " + exported->string());
+    for_each_file(scene, [&](const std::string& key, FileKind, const fs::path& named) {
+        if (is_same_place(named, file)) refuse(fmt::format("what `{}` of the scene names", key));
+        return named;
+    });
+}
+
 // Returns the place of the table, where nothing stands any more.
-fs::path cleared(const fs::path& folder, bool overwrite) {
+fs::path cleared(const fs::path& folder, bool overwrite, Scene& scene) {
     std::error_code error;
     for (const char* name : {"manifest.json", "checkpoint.nephos", "sweep.toml", "shards"})
         if (fs::exists(fs::symlink_status(folder / name, error)))
@@ -50,6 +66,8 @@ fs::path cleared(const fs::path& folder, bool overwrite) {
         throw Error(ErrorCode::usage,
                     files.front().string() + ": is there already: give --overwrite, or another folder");
     for (const fs::path& file : files)
+        if (type_at(file) == fs::file_type::regular) require_nobodys(file, scene);
+    for (const fs::path& file : files)
         if (!fs::remove(file, error) && error)
             throw Error(ErrorCode::io, file.string() + ": cannot remove: " + error.message());
     return folder / "statistics.csv";
@@ -57,8 +75,8 @@ fs::path cleared(const fs::path& folder, bool overwrite) {
 
 }  // namespace
 
-StatisticsTable::StatisticsTable(const fs::path& folder, bool overwrite) : lock_(folder, "run") {
-    path_ = cleared(folder, overwrite);
+StatisticsTable::StatisticsTable(const fs::path& folder, bool overwrite, Scene scene) : lock_(folder, "run") {
+    path_ = cleared(folder, overwrite, scene);
     file_ = open_regular_file(path_, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW);
     write("step,time_s,hum,act,cld,cloud_cover,base_m,top_m,base_mean_m,top_mean_m,perimeter_m,hash\n");
 }

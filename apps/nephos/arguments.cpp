@@ -11,6 +11,7 @@
 #include <tbb/global_control.h>
 
 #include "apps/nephos/terminal.h"
+#include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/paths.h"
 #include "scenes/format/named_files.h"
@@ -220,6 +221,7 @@ void refuse_to_replace_listed_file(const std::string& to) {
         throw Error(ErrorCode::usage, to + ": is a file of the " + kind + " in " + whole.string() +
                                           ": expected the name of another one to write");
     };
+    require_file_name(to);
     if (const auto sweep = sweep_with_file(to)) refuse("sweep", *sweep);
     if (const auto fit = fit_with_file(to)) refuse("fit", *fit);
     if (const auto run = run_with_file(to)) refuse("run", *run);

@@ -83,7 +83,7 @@ Scene load_scene(const SceneArguments& arguments, SceneUse use = SceneUse::every
 void refuse_to_replace(const std::string& from, const std::string& to);
 // The same for each file that a scene names.
 void refuse_to_replace_files_of(Scene scene, const std::string& to);
-// The same when it is of a run, an export, a sweep or a fit.
+// The same when it is of a run, an export, a sweep or a fit, or named as a folder.
 void refuse_to_replace_listed_file(const std::string& to);
 
 // Prints every problem on standard error, "error:" in colour on a terminal.

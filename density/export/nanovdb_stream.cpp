@@ -315,13 +315,16 @@ bool has_edges_of_map(const nanovdb::GridMetaData& grid) {
 
 // Returns whether a map is of doubles, of floats, which renderers on graphics cards take, and backwards the same.
 bool is_consistent(const nanovdb::Map& map) {
-    constexpr double kRounding = 1e-12;
-    double most = 0;  // of an inverse, whose zeros the library rounds for small voxels
-    for (const int n : {0, 4, 8}) most = std::max(most, std::abs(1 / map.mMatD[n]));
+    // OpenVDB eliminates in matrices of small voxels, and so rounds the zeros of their inverse by how far away they are.
+    double inverse = 0, farthest_m = 0;
+    for (const int n : {0, 4, 8}) inverse = std::max(inverse, std::abs(1 / map.mMatD[n]));
+    for (const double at : map.mVecD) farthest_m = std::max(farthest_m, std::abs(at));
+    const double most =
+        std::max(1e-12, 16 * std::numeric_limits<double>::epsilon() * (1 + farthest_m * inverse)) * inverse;
     for (int n = 0; n < 9; ++n) {
         const double backwards = n % 4 == 0 ? 1 / map.mMatD[n] : 0;
         if (map.mMatF[n] != float(map.mMatD[n]) || map.mInvMatF[n] != float(map.mInvMatD[n])) return false;
-        if (!(std::abs(map.mInvMatD[n] - backwards) <= kRounding * most)) return false;
+        if (!(std::abs(map.mInvMatD[n] - backwards) <= most)) return false;
     }
     for (int n = 0; n < 3; ++n)
         if (map.mVecF[n] != float(map.mVecD[n])) return false;

@@ -65,10 +65,20 @@ Points points_of(const openvdb::GridBase& grid, const Coord& low) {
     return points;
 }
 
+// Returns a component at a voxel's centre of a staggered grid, whose components lie on the voxels' low faces along their axes; the last
+// voxel of a row has that face alone.
+template <class Accessor>
+double mean_of_faces(const Accessor& accessor, const Coord& at, const CoordBBox& box, int axis) {
+    Coord next = at;
+    if (at[axis] < box.max()[axis]) ++next[axis];
+    return 0.5 * (double(accessor.getValue(at)[axis]) + double(accessor.getValue(next)[axis]));
+}
+
 template <class Grid>
 void send_values(const openvdb::GridBase& base, const CoordBBox& box, int parts, SandboxWriter& writer) {
     const auto& grid = static_cast<const Grid&>(base);
     const auto accessor = grid.getConstUnsafeAccessor();
+    const bool is_staggered = grid.getGridClass() == openvdb::GRID_STAGGERED;
     for (int k = box.min().z(); k <= box.max().z(); ++k) {
         for (int j = box.min().y(); j <= box.max().y(); ++j) {
             for (int i = box.min().x(); i <= box.max().x(); ++i) {
@@ -76,7 +86,8 @@ void send_values(const openvdb::GridBase& base, const CoordBBox& box, int parts,
                 for (int part = 0; part < parts; ++part) {
                     float number = 0;
                     if constexpr (openvdb::VecTraits<typename Grid::ValueType>::IsVec)
-                        number = float(value[part]);
+                        number =
+                            float(is_staggered ? mean_of_faces(accessor, {i, j, k}, box, part) : value[part]);
                     else
                         number = float(value);
                     writer.value(number);

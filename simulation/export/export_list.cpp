@@ -164,12 +164,17 @@ bool is_listed(const std::filesystem::path& folder, const std::filesystem::path&
     }
 }
 
-// Returns whether an export at work, or one that was killed, has made the file and not listed it yet; of another user, who alone may
-// look into the notes, it is not known.
-bool is_noted(const std::filesystem::path& folder, const std::filesystem::path& file) {
+// The notes of another user are theirs alone to look at: what they say is not known.
+bool has_notes(const std::filesystem::path& folder) {
     std::error_code error;
     const auto type = std::filesystem::symlink_status(notes_of(folder), error).type();
     if (type == std::filesystem::file_type::none && error == std::errc::permission_denied) return false;
+    return stands_there(notes_of(folder));
+}
+
+// Returns whether an export at work, or one that was killed, has made the file and not listed it yet.
+bool is_noted(const std::filesystem::path& folder, const std::filesystem::path& file) {
+    if (!has_notes(folder)) return false;
     return std::ranges::any_of(noted_files(folder), [&](const ExportedFile& noted) {
         return is_same_place(folder / noted.path, file) && file_digest(file) == noted.digest;
     });
@@ -181,7 +186,8 @@ std::optional<std::filesystem::path> export_with_file(const std::filesystem::pat
     if (type_behind(file) != std::filesystem::file_type::regular) return {};
     for (const std::filesystem::path& path : paths_to(file)) {
         const std::filesystem::path folder = holder_of(path);
-        if (folder.filename() == kExportWork && path.filename() == notes_of(folder).filename())
+        if (path.filename() == notes_of(folder).filename() && has_notes(holder_of(folder)) &&
+            is_same_place(notes_of(holder_of(folder)), path))
             return holder_of(folder);
         if (!is_export_folder(folder)) continue;
         if (is_same_place(folder / "export.json", path)) return folder;

@@ -317,6 +317,7 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
             if (compare_file(folder, list, *s, file, formats[file.format])) ++counts[file.format];
             changed += is_changed;
         } catch (const ReadFailure& failure) {  // which says nothing of its content
+            if (!is_of_file(folder, failure)) throw;
             unread.add(failure.what());
         } catch (const std::bad_alloc&) {
             unread.add((folder / file.path).string() + ": cannot compare with its source: out of memory");

@@ -257,6 +257,7 @@ std::vector<Check> check_sidecars(const std::filesystem::path& folder, const Lis
             frames += one.frames;
             untold += one.untold;
         } catch (const ReadFailure& failure) {
+            if (!is_of_file(folder, failure)) throw;
             unread.add(failure.what());
         } catch (const std::bad_alloc&) {
             unread.add((folder / name).string() + ": cannot compare with its sources: out of memory");

@@ -1367,6 +1367,15 @@ class Export(Case):
                   "lattice.origin_m=[-0.17,0.3,1.1]", "--set", "lattice.cells=[8,8,8]", "--set", "field.background.hum=0.9", "--out", "small")
         self.call("export", "small", "--to", "nvdb", "-o", "small-nvdb")
         self.assertIn("files read back", self.call("verify", "small-nvdb").stdout)
+        import pyopenvdb
+        for number, (edge, place) in enumerate(((0.001, (0.004, 58.613, 0)), (0.001, (-0.049, 401.225, -946.725)), (0.00215, (-6.359, 0, 20772.5725)))):
+            grid = pyopenvdb.FloatGrid()
+            grid.copyFromArray(numpy.full((9, 8, 5), 0.5, "f4"))
+            grid.name, grid.gridClass, grid.transform = "density", pyopenvdb.GridClass.FOG_VOLUME, pyopenvdb.createLinearTransform(edge)
+            grid.transform.translate(place)
+            pyopenvdb.write(str(self.folder / f"far_{number}.vdb"), [grid])
+            self.call("export", f"far_{number}.vdb", "--to", "nvdb", "-o", f"far-{number}", "-q")
+            self.assertIn("files read back", self.call("verify", f"far-{number}").stdout)
 
     def test_voxels_that_are_no_numbers(self):
         """NaN in a file whose checksum agrees: compared with its source, it is none of its values."""

@@ -75,7 +75,10 @@ class Fit(Case):
             self.refused(2, "state", "null.toml", "--steps", "1", "--out", f"fit/{name}", says=f"fit/{name}: is a file of the fit in ")
         self.refused(2, "state", "null.toml", "--steps", "1", "--out", "fit/wave-1/points.csv", says="is a file of the sweep in ")
         (self.folder / "fit/fit.json").unlink()  # as after a kill
-        self.refused(2, "state", "null.toml", "--steps", "1", "--out", "fit/fitted.toml", says="is a file of the fit in ")
+        for name in ("fitted.toml", "posterior.csv"):
+            self.refused(2, "state", "null.toml", "--steps", "1", "--out", f"fit/{name}", says="is a file of the fit in ")
+        (self.folder / "fit/fitted.toml").unlink()
+        self.call("state", "null.toml", "--steps", "1", "--out", "fit/posterior.csv", "-q")  # which a fit would not take for its own
 
     def test_the_fitted_scene_finds_its_files(self):
         self.write("null.toml", NULL)

@@ -65,6 +65,10 @@ class InterruptedExport(Case):
             self.refused(2, "state", scene, "--steps", "1", "--out", file, says="is a file of the export in ")
             self.assertEqual(file.read_bytes(), before)
         self.refused(2, "state", scene, "--steps", "1", "--out", "out/.nephos-export/notes.jsonl", says="is a file of the export in ")
+        (self.folder / "out/.nephos-export/alias").symlink_to("notes.jsonl")
+        for name in ("notes.jsonl", "./notes.jsonl", "alias"):
+            self.refused(2, "state", scene, "--steps", "1", "--out", name, cwd=self.folder / "out/.nephos-export", says="is a file of the export in ")
+        (self.folder / "out/.nephos-export/alias").unlink()
         if os.geteuid() == 0 and shutil.which("setpriv"):  # of another user, who may not look into the notes
             self.folder.chmod(0o755)
             (self.folder / "out").chmod(0o777)

@@ -407,6 +407,10 @@ class Stats(Case):
         found = self.stats("other.vdb", "--threshold", "0.5")
         self.assertEqual((found["cells"], found["cell_size_m"]), ([8, 10, 12], 25))
         self.assertAlmostEqual(found["statistics"]["cover"]["mean"], mask.any(axis=0).mean())
+        self.assertEqual(self.stats("other.vdb", "--threshold=-1")["statistics"]["cover"]["mean"], 1)
+        grid.copyFromArray(numpy.ascontiguousarray(mask.transpose(2, 1, 0) * 0.7 - 10, dtype=numpy.float32))
+        pyopenvdb.write(str(self.folder / "below.vdb"), [grid])  # whose values below 0 are read as 0
+        self.refused(2, "stats", "below.vdb", "--threshold=-9.5", says="values below 0 were set to 0, and a threshold of -9.5 is below it")
 
     def test_what_is_missing_or_wrong_is_said(self):
         name = self.netcdf("a.nc", numpy.zeros((4, 5)), ("y", "x"))

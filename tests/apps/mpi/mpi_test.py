@@ -88,6 +88,18 @@ class Mpi(Case):
         self.assertEqual((self.folder / "mpi/statistics.csv").read_bytes(), before)
         self.mpirun(2, scene, "--out", "mpi", *levels, 32, "--overwrite")
         self.assertEqual(len(list((self.folder / "mpi").glob("levels_*.vdb"))), 2)
+        # Levels that are an export's, or what the scene names.
+        next((self.folder / "run/density").iterdir()).rename(self.folder / "levels_10000.vdb")
+        self.call("export", "levels_10000.vdb", "--to", "vdb", "-o", "exported", "-q")
+        self.assertIn("is a file of the export in ", self.mpirun(1, scene, "--steps", "1", "--out", "exported", "--overwrite", status=2).stderr)
+        self.call("verify", "exported")
+        (self.folder / "named").mkdir()
+        (self.folder / "levels_10000.vdb").rename(self.folder / "named/levels_10000.vdb")
+        named = self.write("n.toml", SCENE.format(boundaries='"periodic"', wind="") +
+                           '[[field.grids]]\nof = "act"\nfile = "named/levels_10000.vdb"\ngrid = "density"\n')
+        for _ in range(2):
+            self.assertIn("is what `field.grids[0].file` of the scene names",
+                          self.mpirun(1, named, "--steps", "1", "--out", "named", "--overwrite", status=2).stderr)
         victim = pathlib.Path(self.write("victim", "precious"))
         for name in ("link", "pipe"):
             (self.folder / name).mkdir()
