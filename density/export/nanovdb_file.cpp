@@ -16,20 +16,10 @@
 #include <fcntl.h>
 #include <zlib.h>
 
-#define NANOVDB_USE_OPENVDB
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wold-style-cast"
-#pragma GCC diagnostic ignored "-Wcast-qual"
-#pragma GCC diagnostic ignored "-Wshadow"
-#pragma GCC diagnostic ignored "-Wextra"
-#pragma GCC diagnostic ignored "-Wall"
-#include <nanovdb/util/IO.h>
-#include <nanovdb/util/OpenToNanoVDB.h>
-#pragma GCC diagnostic pop
-
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "density/export/nanovdb_library.h"
 #include "density/export/nanovdb_stream.h"
 #include "density/openvdb_access.h"
 #include "density/vdb/vdb_output.h"

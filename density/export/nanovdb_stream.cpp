@@ -19,16 +19,7 @@
 #include <ext/stdio_filebuf.h>
 #include <zlib.h>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wold-style-cast"
-#pragma GCC diagnostic ignored "-Wcast-qual"
-#pragma GCC diagnostic ignored "-Wshadow"
-#pragma GCC diagnostic ignored "-Wextra"
-#pragma GCC diagnostic ignored "-Wall"
-#include <nanovdb/util/GridChecksum.h>
-#include <nanovdb/util/IO.h>
-#pragma GCC diagnostic pop
-
+#include "density/export/nanovdb_library.h"
 #include "density/openvdb_access.h"
 #include "density/vdb/block_stream.h"
 
