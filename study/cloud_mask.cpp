@@ -80,10 +80,12 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
     CloudMasks masks{{}, size, size, {grid.placement().origin_m.z}, options.boundaries, false, 0, {}};
     const double threshold = options.threshold.value_or(0);
     BitPlane& plane = masks.snapshots.emplace_back(extent);
-    if (threshold < 0 && !loaded.notes.empty())
+    if (threshold < 0 && loaded.negative > 0)
         fail(ErrorCode::usage, path,
-             fmt::format("{}, and a threshold of {} is below it: expected one of 0 or more",
-                         loaded.notes.front(), threshold));
+             fmt::format("has {} values below 0, which are read as 0, and so does not tell what is above {}: "
+                         "expected a "
+                         "threshold of 0 or more",
+                         loaded.negative, threshold));
     if (threshold < 0) {  // so that what is clear is cloud
         plane = plane_of(extent, threshold, [](int, int, int) { return 0.0; });
         return masks;

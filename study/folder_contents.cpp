@@ -147,13 +147,13 @@ std::optional<fs::path> fit_with_file(const fs::path& file) {
     for (const fs::path& path : paths_to(file)) {
         const std::string name = path.filename().string();
         const fs::path folder = holder_of(path);
-        const bool is_complete = begins_with(folder / "fit.json", kFit);
+        // Others beside them say nothing of a fit, and may be nobody's to read.
+        if (name != "fit.json" && name != "fitted.toml" && name != "posterior.csv") continue;
+        if (name == "fitted.toml" && !begins_with(path, kWrittenByFit)) continue;
+        if (begins_with(folder / "fit.json", kFit)) return folder;
         // One that was killed has no fit.json yet, and knows its samples by the scene that it writes before them.
-        const bool is_begun = is_complete || is_sweep_folder(folder / "wave-1");
-        if ((name == "fit.json" && is_complete) ||
-            (name == "fitted.toml" && is_begun && begins_with(path, kWrittenByFit)) ||
-            (name == "posterior.csv" && is_begun &&
-             (is_complete || begins_with(folder / "fitted.toml", kWrittenByFit))))
+        if (name != "fit.json" && is_sweep_folder(folder / "wave-1") &&
+            begins_with(folder / "fitted.toml", kWrittenByFit))
             return folder;
     }
     return {};

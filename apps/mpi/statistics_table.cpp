@@ -48,6 +48,7 @@ void require_nobodys(const fs::path& file, Scene& scene) {
     };
     if (const auto run = run_with_file(file)) refuse("a file of the run in " + run->string());
     if (const auto exported = export_with_file(file)) refuse("a file of the export in " + exported->string());
+    if (is_same_place(scene.file_places.scene_file, file)) refuse("the scene");
     for_each_file(scene, [&](const std::string& key, FileKind, const fs::path& named) {
         if (is_same_place(named, file)) refuse(fmt::format("what `{}` of the scene names", key));
         return named;
@@ -66,7 +67,7 @@ fs::path cleared(const fs::path& folder, bool overwrite, Scene& scene) {
         throw Error(ErrorCode::usage,
                     files.front().string() + ": is there already: give --overwrite, or another folder");
     for (const fs::path& file : files)
-        if (type_at(file) == fs::file_type::regular) require_nobodys(file, scene);
+        if (type_behind(file) == fs::file_type::regular) require_nobodys(file, scene);
     for (const fs::path& file : files)
         if (!fs::remove(file, error) && error)
             throw Error(ErrorCode::io, file.string() + ": cannot remove: " + error.message());

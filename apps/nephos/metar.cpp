@@ -138,7 +138,7 @@ int metar(const MetarArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     const std::string text = report_of(a.report);
     if (a.report.starts_with('@')) refuse_to_replace(a.report.substr(1), a.scene);
-    refuse_to_replace_listed_file(a.scene);
+    if (!a.scene.empty()) refuse_to_replace_listed_file(a.scene);
     std::optional<Taf> taf;
     Metar report;
     try {

@@ -277,6 +277,7 @@ LoadedDensity receive_density(SandboxReader& reader, bool list_grids) {
         loaded.notes.push_back("its voxels are not cubes along the axes: resampled to voxels of " +
                                number_text(placement.cell_size_m, 6) + " m");
     }
+    loaded.negative = result.negative;
     if (result.negative > 0) {
         loaded.notes.push_back(std::to_string(result.negative) + " values below 0 were set to 0");
     }

@@ -489,6 +489,10 @@ class Keeping(Case):
         os.chown(folder, 65534, 65534)
         (self.folder / "closed").chmod(0o700)
         for _ in range(2):
+            # Beside others' files that say nothing of it.
+            (folder / "fit.json").write_text("{}")
+            (folder / "fit.json").chmod(0o600)
+            (folder / "wave-1").mkdir(mode=0o700, exist_ok=True)
             state = subprocess.run(["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups", NEPHOS, "state", "scene.toml", "--steps", "1", "-q", "-o",
                                     "x.vdb"], cwd=folder, env=self.environment, capture_output=True, text=True)
             self.assertEqual(state.returncode, 0, state.stderr)

@@ -408,9 +408,13 @@ class Stats(Case):
         self.assertEqual((found["cells"], found["cell_size_m"]), ([8, 10, 12], 25))
         self.assertAlmostEqual(found["statistics"]["cover"]["mean"], mask.any(axis=0).mean())
         self.assertEqual(self.stats("other.vdb", "--threshold=-1")["statistics"]["cover"]["mean"], 1)
+        grid.transform = pyopenvdb.createLinearTransform([[25, 0, 0, 0], [0, 30, 0, 0], [0, 0, 40, 0], [0, 0, 0, 1]])
+        pyopenvdb.write(str(self.folder / "flat.vdb"), [grid])  # is resampled, which is another note
+        self.assertEqual(self.stats("flat.vdb", "--threshold=-1")["statistics"]["cover"]["mean"], 1)
+        grid.transform = pyopenvdb.createLinearTransform(25.0)
         grid.copyFromArray(numpy.ascontiguousarray(mask.transpose(2, 1, 0) * 0.7 - 10, dtype=numpy.float32))
         pyopenvdb.write(str(self.folder / "below.vdb"), [grid])  # whose values below 0 are read as 0
-        self.refused(2, "stats", "below.vdb", "--threshold=-9.5", says="values below 0 were set to 0, and a threshold of -9.5 is below it")
+        self.refused(2, "stats", "below.vdb", "--threshold=-9.5", says="values below 0, which are read as 0, and so does not tell what is above -9.5")
 
     def test_what_is_missing_or_wrong_is_said(self):
         name = self.netcdf("a.nc", numpy.zeros((4, 5)), ("y", "x"))

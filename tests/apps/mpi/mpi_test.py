@@ -93,11 +93,18 @@ class Mpi(Case):
         self.call("export", "levels_10000.vdb", "--to", "vdb", "-o", "exported", "-q")
         self.assertIn("is a file of the export in ", self.mpirun(1, scene, "--steps", "1", "--out", "exported", "--overwrite", status=2).stderr)
         self.call("verify", "exported")
+        itself = self.write("itself/statistics.csv", pathlib.Path(scene).read_text())
+        self.assertIn("is the scene", self.mpirun(1, itself, "--steps", "1", "--out", "itself", "--overwrite", status=2).stderr)
         (self.folder / "named").mkdir()
         (self.folder / "levels_10000.vdb").rename(self.folder / "named/levels_10000.vdb")
         named = self.write("n.toml", SCENE.format(boundaries='"periodic"', wind="") +
                            '[[field.grids]]\nof = "act"\nfile = "named/levels_10000.vdb"\ngrid = "density"\n')
-        for _ in range(2):
+        (self.folder / "named/levels_10000.vdb").rename(self.folder / "named/real.vdb")
+        for target in ("real.vdb", None):
+            if target:
+                (self.folder / "named/levels_10000.vdb").symlink_to(target)
+            else:
+                (self.folder / "named/real.vdb").rename(self.folder / "named/levels_10000.vdb")
             self.assertIn("is what `field.grids[0].file` of the scene names",
                           self.mpirun(1, named, "--steps", "1", "--out", "named", "--overwrite", status=2).stderr)
         victim = pathlib.Path(self.write("victim", "precious"))
