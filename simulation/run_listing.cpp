@@ -44,7 +44,7 @@ bool is_of_run(const RunListing& run, const std::filesystem::path& file) {
     return !OwnFiles(run.folder, read_manifest(run.folder / "manifest.json"), run.scene).why_foreign(file);
 }
 
-// What is above the folders of a user may be none of them: where they may not look, no run of theirs is.
+// Returns whether a run may be in a folder: not in one that the user may not search, as folders above their own may be.
 bool may_be_run_folder(const std::filesystem::path& folder) {
     std::error_code error;
     const auto type = std::filesystem::status(folder / "manifest.json", error).type();

@@ -13,7 +13,7 @@ namespace nephos {
 // The title of a sweep's series.nc, and the first line of a fit's scene; kWrittenBySweep is that of a sweep's TOML.
 inline constexpr std::string_view kSweepTitle = "nephos sweep", kWrittenByFit = "# Written by nephos fit.\n";
 
-// What `nephos sweep --emit` writes, and how it begins.
+// Lists the files that `nephos sweep --emit` writes, with their beginnings.
 inline constexpr std::pair<std::string_view, std::string_view> kSweepScripts[] = {
     {"sweep.slurm", "#!/bin/bash\n# Runs a sweep in "},
     {"Snakefile", "# Runs a sweep in "},

@@ -190,7 +190,7 @@ void check_numbers(const CheckedJson& json, const ListedExport& list, const List
         json.at("frames").fail(fmt::format("{} frames, as in export.json", files));
 }
 
-// How far a sidecar could be compared.
+// Says how far a sidecar could be compared.
 struct Compared {
     bool sources = true;                 // all are there and unchanged
     std::size_t frames = 0, untold = 0;  // untold: whose files say nothing of their time

@@ -41,7 +41,7 @@ void put_number(std::string& bytes, std::size_t at, T number) {
     if (at + sizeof number <= bytes.size()) std::memcpy(bytes.data() + at, &number, sizeof number);
 }
 
-// A file whose grid is not compressed, and where it is not 0.
+// Holds a file that nephos writes, its grid uncompressed, and the places of its bytes that are not 0.
 struct Original {
     std::string bytes;
     std::size_t grid = 0;       // first byte of the grid
@@ -96,7 +96,8 @@ const Original& original_of(std::size_t n) {
     return originals[n % originals.size()];
 }
 
-// Where, by how much beside, how many bytes, and what they become; or how many bytes the file keeps.
+// Changes bytes as a record says: bytes 0 and 1 choose a place that is not 0, 2 a signed distance from it, 3 how many bytes (or that
+// the file ends there), and 4 to 11 what they become.
 void change(std::string& bytes, const Original& original, const std::uint8_t* record) {
     const std::size_t chosen = std::size_t(record[0] | record[1] << 8) % original.places.size();
     const auto beside = std::int64_t(static_cast<std::int8_t>(record[2]));
@@ -132,7 +133,7 @@ std::string packed(const std::string& bytes, const Original& original) {
     return file;
 }
 
-// What the child sends, as the parent gets it.
+// Reads what the child has sent, as the parent does.
 class Sent : public SandboxReader {
   public:
     explicit Sent(std::string bytes) : bytes_(std::move(bytes)) {}
