@@ -15,7 +15,7 @@ import unittest
 SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
 sys.path.insert(1, str(SOURCE / "tests/apps/command"))
 
-from case import Case, NEPHOS, NULL_SCENE  # noqa: E402
+from case import NEPHOS, NULL_SCENE, PATIENCE, Case  # noqa: E402
 from one_node_slurm import Slurm  # noqa: E402
 
 TABLES = ("runs.csv", "points.csv", "failures.csv", "series.nc", "manifest.json")
@@ -36,7 +36,7 @@ class Emitted(Case):
 
     def command(self, *arguments, **options):
         result = subprocess.run([str(word) for word in arguments], cwd=self.folder / "emitted", env=self.environment,
-                                capture_output=True, text=True, timeout=240, **options)
+                                capture_output=True, text=True, timeout=PATIENCE, **options)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         return result.stdout
 
@@ -116,7 +116,7 @@ class Engines(Emitted):
         self.assertIn("null.toml", main)
         script = self.write("study.py", main.replace("steps=(300, 3000)", "steps=(200, 400)"))
         result = subprocess.run([sys.executable, script], cwd=self.folder, env=self.environment, capture_output=True,
-                                text=True, timeout=240)
+                                text=True, timeout=PATIENCE)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         for name in TABLES:
             self.assertEqual((self.folder / "sweep" / name).read_bytes(), (self.folder / "here" / name).read_bytes(), name)

@@ -90,7 +90,7 @@ class Slurm:
 
     def call(self, *arguments, cwd=None):
         return subprocess.run([str(word) for word in arguments], env=self.environment, cwd=cwd, capture_output=True,
-                              text=True, timeout=120)
+                              text=True, timeout=600)
 
     def submit(self, *arguments, cwd):
         result = self.call("sbatch", "--parsable", *arguments, cwd=cwd)
@@ -128,7 +128,7 @@ class Slurm:
                                                    stderr=subprocess.STDOUT, start_new_session=True))
 
     def _wait(self, ready, name):
-        for _ in range(300):
+        for _ in range(3000):
             if ready():
                 return
             if self.processes[-1].poll() is not None:

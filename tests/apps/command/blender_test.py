@@ -8,7 +8,7 @@ import subprocess
 import sys
 import unittest
 
-from case import Case, SCENE
+from case import PATIENCE, SCENE, Case
 
 IMPORT = """
 import bpy, sys
@@ -29,7 +29,7 @@ class Blender(Case):
         self.call("export", "run", "--for", "blender", "-o", "blender")
         script = self.write("import.py", IMPORT)
         said = subprocess.run(["blender", "--background", "--factory-startup", "--python", script, "--", str(self.folder / "blender") + "/", "5"],
-                              capture_output=True, text=True, timeout=200).stdout
+                              capture_output=True, text=True, timeout=PATIENCE).stdout
         self.assertIn("FOUND ['density', 'velocity'] True 5 1 velocity", said)
         place = [float(number) for number in re.search(r"PLACE (.*)", said)[1].split()]
         # The centre of the first voxel, moved by half a voxel: the corner of the box.

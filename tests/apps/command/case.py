@@ -18,6 +18,8 @@ NEPHOS = os.path.abspath(os.environ["NEPHOS"])
 SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
 # A build whose shadow memory takes terabytes of addresses, and several times the time.
 SANITIZED = os.environ.get("NEPHOS_SANITIZED") == "1"
+# Seconds after which what takes a few is taken for hanging, also on a machine that does much else.
+PATIENCE = 3000 if SANITIZED else 600
 
 
 def limit_addresses(size):
@@ -111,7 +113,7 @@ class Case(unittest.TestCase):
     def call(self, *arguments, status=0, env=None, cwd=None, **options):
         """Runs the command; checks its exit status."""
         result = subprocess.run([NEPHOS, *map(str, arguments)], cwd=cwd or self.folder, capture_output=True, text=True,
-                                env={**self.environment, **(env or {})}, timeout=900 if SANITIZED else 120, **options)
+                                env={**self.environment, **(env or {})}, timeout=PATIENCE, **options)
         self.assertEqual(result.returncode, status, f"{arguments}\n{result.stdout}\n{result.stderr}")
         return result
 

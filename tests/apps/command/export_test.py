@@ -14,7 +14,7 @@ import zlib
 
 import numpy
 
-from case import NEPHOS, Case, SANITIZED, SCENE, SOURCE, limit_addresses, voxels, unsealed
+from case import NEPHOS, PATIENCE, SANITIZED, SCENE, SOURCE, Case, limit_addresses, unsealed, voxels
 from verify_test import LAYERED, PLACED
 
 
@@ -1056,7 +1056,7 @@ class Export(Case):
         while process.poll() is None and not (out / "tiny_0003.vti").exists():
             time.sleep(0.001)
         out.rename(self.folder / "elsewhere")
-        _, error = process.communicate(timeout=120)
+        _, error = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 3, error)
         self.assertIn("was removed or renamed while the export was writing", error)
         self.assertFalse((out / "export.json").exists())
@@ -1073,7 +1073,7 @@ class Export(Case):
         self.assertFalse((self.folder / "raced" / last.with_suffix(".vti").name).exists())
         shutil.copy(self.folder / "long/density/tiny_0001.vdb", last)
         process.send_signal(signal.SIGCONT)
-        error = process.communicate(timeout=120)[1]
+        error = process.communicate(timeout=PATIENCE)[1]
         self.assertEqual(process.returncode, 3, error)
         self.assertIn(f"{last.name}: was changed while it was exported", error)
         listing = json.loads((self.folder / "raced/export.json").read_text())

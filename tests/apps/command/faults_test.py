@@ -12,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from case import Case, LONG, NEPHOS, SOURCE
+from case import LONG, NEPHOS, PATIENCE, SOURCE, Case
 
 
 class Faults(Case):
@@ -27,7 +27,7 @@ class Faults(Case):
 
     def run_into(self, out, *arguments, env=None):
         return subprocess.run([NEPHOS, "run", self.scene, "--no-render", "--out", out, *arguments], cwd=self.folder,
-                              capture_output=True, text=True, env=env or self.environment, timeout=120)
+                              capture_output=True, text=True, env=env or self.environment, timeout=PATIENCE)
 
     def no_leftovers(self, out):
         self.assertEqual([p.name for p in (self.folder / out).rglob(".*")], [])
@@ -171,7 +171,7 @@ class Faults(Case):
     def fails_at_each_call(self, call, path, *arguments):
         """Lets one call on a file fail after the other, also in the process that parses it; returns how many there are."""
         for number in range(1, 100):
-            result = subprocess.run([NEPHOS, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=120,
+            result = subprocess.run([NEPHOS, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=PATIENCE,
                                     env=self.failing(f"{call} EIO {number} 1", path))
             if result.returncode == 0:
                 return number - 1
@@ -198,7 +198,7 @@ class Faults(Case):
         arguments = ["run", self.scene, "--video", "--splatting", "cpu", "--set", "camera.height=32", "--out", "out"]
         for call in ("read EIO 1 1000000", "read EIO 2 1000000", "read EIO 2 1"):
             with self.subTest(call=call):
-                result = subprocess.run([NEPHOS, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=120,
+                result = subprocess.run([NEPHOS, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=PATIENCE,
                                         env=self.failing(call, "socket:", "ffmpeg"))
                 self.assertEqual(result.returncode, 3, result.stderr)
                 self.assertIn("tiny.mp4: ffmpeg", result.stderr)
@@ -225,7 +225,7 @@ class Faults(Case):
         return process
 
     def ends_with(self, process, says):
-        output, errors = process.communicate(timeout=120)
+        output, errors = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 3, output + errors)
         self.assertEqual(output, "")
         self.assertIn(says, errors)
@@ -253,7 +253,7 @@ class Faults(Case):
         self.assertTrue(os.WIFSTOPPED(os.waitpid(merge.pid, os.WUNTRACED)[1]))
         (self.folder / "sweep").rename(self.folder / "moved")
         merge.send_signal(signal.SIGCONT)
-        self.assertEqual(merge.wait(timeout=60), 3)
+        self.assertEqual(merge.wait(timeout=PATIENCE), 3)
         self.assertIn("sweep: was removed or replaced while its tables were written", merge.stderr.read())
         self.assertFalse((self.folder / "sweep").exists())
         self.no_leftovers("moved")
@@ -291,21 +291,21 @@ class Faults(Case):
                     (("sweep", self.scene, "--axis", "field.background.ext=0.1", "--replicates", "1", "--steps", "20", "--out", "sweep", "-q"),
                      "timing.csv", self.folder / "sweep/timing.csv", rows)):
                 file.write_bytes(content)
-                result = subprocess.run([NEPHOS, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True, timeout=120,
+                result = subprocess.run([NEPHOS, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True, timeout=PATIENCE,
                                         env=self.failing(f"stat EIO {number} 1", path))
                 self.assertIn(result.returncode, (2, 3), (arguments, number, result.stderr))
                 self.assertEqual(file.read_bytes(), content, (arguments, number))
             private = self.folder / "private.vdb"
             private.write_bytes(b"")
             private.chmod(0o600)
-            subprocess.run([NEPHOS, "state", self.scene, "--steps", "1", "--out", private, "-q"], cwd=self.folder, capture_output=True, timeout=120,
+            subprocess.run([NEPHOS, "state", self.scene, "--steps", "1", "--out", private, "-q"], cwd=self.folder, capture_output=True, timeout=PATIENCE,
                            env=self.failing(f"stat EIO {number} 1", "private.vdb"), check=False)
             self.assertEqual(private.stat().st_mode & 0o777, 0o600, number)
 
     def test_rows_are_not_appended_to_what_a_link_leads_to(self):
         process = self.started("out")
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=120)
+        process.communicate(timeout=PATIENCE)
         table, other = self.folder / "out/statistics.csv", self.folder / "other.csv"
         table.rename(other)
         table.symlink_to(other)
@@ -324,7 +324,7 @@ class Faults(Case):
                 return None
             meanwhile()
             process.send_signal(signal.SIGCONT)
-            said = process.communicate(timeout=60)[1]
+            said = process.communicate(timeout=PATIENCE)[1]
             return process.returncode, said
         finally:
             process.kill()

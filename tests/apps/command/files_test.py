@@ -10,7 +10,7 @@ import struct
 import subprocess
 import unittest
 
-from case import BAD, Case, NEPHOS, SANITIZED, SCENE, limit_addresses, unsealed
+from case import BAD, NEPHOS, PATIENCE, SANITIZED, SCENE, Case, limit_addresses, unsealed
 
 
 class Files(Case):
@@ -148,7 +148,7 @@ class Files(Case):
                 self.refused(3, *arguments, "pipe", says="pipe")
         self.refused(3, "hash", self.scene, "--check", "/dev/zero", says="/dev/zero: is a device: expected a file")
         result = subprocess.run(["bash", "-c", f'"{NEPHOS}" validate <(cat "{self.scene}")'], capture_output=True, text=True,
-                                timeout=60, env=self.environment)
+                                timeout=PATIENCE, env=self.environment)
         self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_one_unreadable_file_does_not_hide_the_others(self):

@@ -14,7 +14,7 @@ import unittest
 
 import xxhash
 
-from case import Case, NEPHOS
+from case import NEPHOS, PATIENCE, Case
 
 NULL = """\
 [lattice]
@@ -113,7 +113,7 @@ class Fit(Case):
                     if workers and any((self.folder / "out").glob("wave-1/shards/*.jsonl")):
                         os.kill(int(workers[0]), signal.SIGKILL)
                         break
-            status = process.wait(timeout=120)
+            status = process.wait(timeout=PATIENCE)
             self.assertIn(status, (0, 1, 2))  # 2: too few are left
             self.assertEqual("failed" in process.stderr.read(), status != 0)
             if status != 0:

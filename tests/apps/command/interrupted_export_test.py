@@ -8,7 +8,7 @@ import subprocess
 import time
 import unittest
 
-from case import NEPHOS, Case, limit_addresses
+from case import NEPHOS, PATIENCE, Case, limit_addresses
 from verify_test import PLACED
 
 
@@ -157,7 +157,7 @@ class InterruptedExport(Case):
             process = self.stopped(f"open STOP {opened} 1", "manifest.json", "export", "run", "--to", "raw", "--to", "metar", "-o", f"out{opened}")
             self.call(*run, "run", "--resume")
             process.send_signal(signal.SIGCONT)
-            error = process.communicate(timeout=60)[1]
+            error = process.communicate(timeout=PATIENCE)[1]
             self.assertEqual(process.returncode, 0, error)
             volumes = len(list((self.folder / f"out{opened}").glob("*.raw")))
             self.assertEqual(len((self.folder / f"out{opened}/placed.metar.txt").read_text().splitlines()), volumes)
@@ -173,7 +173,7 @@ class InterruptedExport(Case):
         (self.folder / "out/.nephos-export").rename(self.folder / "away")
         (self.folder / "out/.nephos-export").symlink_to("../victim")
         process.send_signal(signal.SIGCONT)
-        error = process.communicate(timeout=60)[1]
+        error = process.communicate(timeout=PATIENCE)[1]
         self.assertEqual((process.returncode, (self.folder / "victim/letter.txt").read_text()), (2, "mine"), error)
         self.refused(2, "export", "run", "--to", "raw", "-o", "out", says=".nephos-export: is in the way")
         (self.folder / "out/.nephos-export").unlink()
@@ -291,7 +291,7 @@ class InterruptedExport(Case):
                 if os.geteuid() == 0:
                     os.chown(hidden, owner, owner)
                 process.send_signal(signal.SIGCONT)
-                error = process.communicate(timeout=60)[1]
+                error = process.communicate(timeout=PATIENCE)[1]
                 self.assertEqual((process.returncode, (hidden / "thesis.txt").read_text()), (2, "mine"), error)
                 self.assertIn(".nephos-export: is in the way", error)
                 hidden.rename(self.folder / "thesis")
@@ -341,7 +341,7 @@ class InterruptedExport(Case):
             else:
                 (self.folder / "own/tiny_0001.raw").write_text("mine")
             process.send_signal(signal.SIGCONT)
-            error = process.communicate(timeout=120)[1]
+            error = process.communicate(timeout=PATIENCE)[1]
             self.assertEqual(process.returncode, 3, error)
             self.assertIn("was removed or", error)
             if act == "exchange":
@@ -368,7 +368,7 @@ class InterruptedExport(Case):
                 (self.folder / "out/placed_0003.raw").unlink()
                 (self.folder / "out/placed_0003.raw").write_text("mine")
             process.send_signal(signal.SIGCONT)
-            error = process.communicate(timeout=120)[1]
+            error = process.communicate(timeout=PATIENCE)[1]
             self.assertEqual(process.returncode, 3, error)
             if swaps:
                 self.assertIn("was removed or renamed", error)
@@ -389,7 +389,7 @@ class InterruptedExport(Case):
             process = self.stopped(stop, path, "export", "run", "--to", "raw", "-o", "out")
             (self.folder / "out/export.json").write_text("mine")
             process.send_signal(signal.SIGCONT)
-            error = process.communicate(timeout=60)[1]
+            error = process.communicate(timeout=PATIENCE)[1]
             self.assertEqual((process.returncode, (self.folder / "out/export.json").read_text()), (2, "mine"), error)
             self.assertIn("export.json: is there already", error)
             self.assertEqual([path.name for path in (self.folder / "out").iterdir()], ["export.json"])
@@ -402,7 +402,7 @@ class InterruptedExport(Case):
             process = self.stopped(stop, path, "export", "run", *formats, "-o", "out")
             process.send_signal(signal.SIGINT)
             process.send_signal(signal.SIGCONT)
-            error = process.communicate(timeout=60)[1]
+            error = process.communicate(timeout=PATIENCE)[1]
             self.assertEqual(process.returncode, 130, error)
             self.assertIn("stopped; the same command goes on", error)
             self.assertEqual(list((self.folder / "out").glob("placed.*")), [])
@@ -416,7 +416,7 @@ class InterruptedExport(Case):
         process = self.stopped("read STOP 1 1", "density/placed_0002", "export", "run", "--to", "raw", "--range", "auto", "-o", "out")
         process.send_signal(signal.SIGTERM)
         process.send_signal(signal.SIGCONT)
-        error = process.communicate(timeout=60)[1]
+        error = process.communicate(timeout=PATIENCE)[1]
         self.assertEqual(process.returncode, 143, error)
         self.assertFalse((self.folder / "out").exists())
 
@@ -434,7 +434,7 @@ class InterruptedExport(Case):
                 latest.unlink()
                 latest.symlink_to(other)
                 process.send_signal(signal.SIGCONT)
-                error = process.communicate(timeout=60)[1]
+                error = process.communicate(timeout=PATIENCE)[1]
                 self.assertEqual(process.returncode, 3, error)
                 latest.unlink()
                 latest.symlink_to("run")
@@ -474,7 +474,7 @@ class InterruptedExport(Case):
         self.assertFalse(last.exists())
         last.write_text("mine")
         process.send_signal(signal.SIGCONT)
-        error = process.communicate(timeout=120)[1]
+        error = process.communicate(timeout=PATIENCE)[1]
         self.assertEqual((process.returncode, last.read_text()), (2, "mine"), error)
         self.assertIn(f"{last.name}: is there already", error)
         last.unlink()

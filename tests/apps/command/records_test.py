@@ -12,7 +12,7 @@ import unittest
 
 import xxhash
 
-from case import Case, NEPHOS
+from case import NEPHOS, PATIENCE, Case
 from sweep_test import NULL, TABLES, rows
 
 
@@ -85,7 +85,7 @@ class Records(Case):
                                        "--clouds-every", "0", "-q", "-j", "1", "--out", "at once", "--shard", f"{n}/12"], cwd=self.folder,
                                       env=self.environment, stderr=subprocess.PIPE, text=True) for n in range(12)]
             for part in parts:
-                _, said = part.communicate(timeout=60)
+                _, said = part.communicate(timeout=PATIENCE)
                 self.assertEqual(part.returncode, 0, said)
             shutil.rmtree(self.folder / "at once")
 
@@ -186,7 +186,7 @@ class Records(Case):
                 self.assertIsNone(process.poll())
                 begin = time.monotonic()
                 process.send_signal(signal.SIGTERM)
-                said = process.communicate(timeout=20)[1]
+                said = process.communicate(timeout=PATIENCE)[1]
                 self.assertLess(time.monotonic() - begin, 1)
                 self.assertEqual(process.returncode, 143)
                 self.assertIn("stopped after 0 of 1 runs", said)

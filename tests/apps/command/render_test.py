@@ -13,7 +13,7 @@ import unittest
 
 from PIL import Image
 
-from case import Case, NEPHOS, SCENE, SOURCE, unsealed
+from case import NEPHOS, PATIENCE, SCENE, SOURCE, Case, unsealed
 
 
 class Vulkan(Case):
@@ -174,12 +174,12 @@ class Pictures(Case):
         self.call("run", self.scene, *changes, "--out", "whole")
         process = subprocess.Popen([NEPHOS, "run", self.scene, *changes, "--out", "stopped"], cwd=self.folder,
                                    env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        end = time.monotonic() + 60
+        end = time.monotonic() + PATIENCE
         while not (self.folder / "stopped/frames/tiny_0003.png").exists():
             self.assertLess(time.monotonic(), end)
             time.sleep(0.002)
         process.send_signal(signal.SIGINT)
-        self.assertEqual(process.wait(timeout=60), 130)
+        self.assertEqual(process.wait(timeout=PATIENCE), 130)
         self.call("run", self.scene, *changes, "--out", "stopped", "--resume")
         self.same_runs("whole", "stopped")
         for name in sorted(p.name for p in (self.folder / "whole/frames").iterdir()):
@@ -294,7 +294,7 @@ class Pictures(Case):
                 self.assertIsNone(process.poll())
                 time.sleep(0.05)
             process.send_signal(number)
-            self.assertEqual(process.wait(timeout=20), 128 + number)
+            self.assertEqual(process.wait(timeout=PATIENCE), 128 + number)
             (self.folder / "taken").unlink()
             command.append("--resume")
         (hanging / "ffmpeg").write_text(f"#!/bin/sh\n{shutil.which('ffmpeg')} \"$@\"; exit 1\n")

@@ -19,7 +19,7 @@ from html.parser import HTMLParser
 import xxhash
 from PIL import Image
 
-from case import Case, SOURCE
+from case import PATIENCE, SOURCE, Case
 from sweep_test import NULL
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -90,7 +90,7 @@ class Report(Case):
                  f"--user-data-dir={profile}", f"--proxy-server=127.0.0.1:{server.server_port}",
                  "--proxy-bypass-list=<-loopback>", "--enable-logging=stderr", "--window-size=1100,1400",
                  "--virtual-time-budget=5000", *arguments, pathlib.Path(page).as_uri()],
-                capture_output=True, text=True, timeout=240, cwd=self.folder)
+                capture_output=True, text=True, timeout=PATIENCE, cwd=self.folder)
         finally:
             server.shutdown()
             server.server_close()

@@ -11,7 +11,7 @@ import subprocess
 import time
 import unittest
 
-from case import Case, LONG, NEPHOS, rows_of, SCENE, SOURCE, voxels
+from case import LONG, NEPHOS, PATIENCE, SCENE, SOURCE, Case, rows_of, voxels
 
 
 class Run(Case):
@@ -98,7 +98,7 @@ class Run(Case):
             self.assertIsNone(process.poll())
             time.sleep(0.01)
         process.send_signal(signal.SIGTERM)
-        _, said = process.communicate(timeout=60)
+        _, said = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 128 + signal.SIGTERM, said)
         self.assertIn("with --resume goes on", said)
 
@@ -116,7 +116,7 @@ class Run(Case):
         os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)  # in a later part
         shutil.copy(self.folder / "other.vdb", self.folder / "s.vdb")
         process.send_signal(signal.SIGCONT)
-        said = process.communicate(timeout=60)[1]
+        said = process.communicate(timeout=PATIENCE)[1]
         self.assertEqual(process.returncode, 1, said)
         inputs = [json.loads((self.folder / name / "manifest.json").read_text())["inputs"] for name in ("whole", "until")]
         self.assertEqual(inputs[0], inputs[1])
@@ -148,7 +148,7 @@ class Run(Case):
 
         def run(*arguments):
             done = subprocess.run([os.fsencode(NEPHOS), b"run", *arguments, b"--statistics-only", b"--checkpoint"], cwd=self.folder,
-                                  env=self.environment, capture_output=True, timeout=60)
+                                  env=self.environment, capture_output=True, timeout=PATIENCE)
             return done.returncode, done.stderr
         self.assertEqual(run(b"f\xffx/a.toml", b"--out", b"f\xffx/out"), (0, b""))
         for arguments in ((b"--resume", b"--out", b"f\xffx/out"), (b"--from", b"f\xffx/out", b"--out", b"branch")):
@@ -327,12 +327,12 @@ class Branch(Case):
         self.call("run", "--from", "source", *self.BRANCH, "--out", "whole")
         process = subprocess.Popen([NEPHOS, "run", "--from", "source", *self.BRANCH, "--out", "part"], cwd=self.folder,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.environment)
-        end = time.monotonic() + 60
+        end = time.monotonic() + PATIENCE
         while not (self.folder / "part/density/tiny_0003.vdb").exists():
             self.assertLess(time.monotonic(), end)
             time.sleep(0.002)
         process.send_signal(signal.SIGTERM)
-        _, errors = process.communicate(timeout=60)
+        _, errors = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 128 + signal.SIGTERM, errors)
 
     def goes_on(self, *arguments):
@@ -560,7 +560,7 @@ class Signals(Case):
                                 stderr=subprocess.PIPE, text=True, env=self.environment)
 
     def wait_for(self, path):
-        end = time.monotonic() + 60
+        end = time.monotonic() + PATIENCE
         while not (self.folder / path).exists():
             self.assertLess(time.monotonic(), end, f"{path} never appeared")
             time.sleep(0.002)
@@ -570,7 +570,7 @@ class Signals(Case):
         process = self.start("run", *arguments)
         self.wait_for("stopped/density/long_0002.vdb")
         process.send_signal(number)
-        output, errors = process.communicate(timeout=60)
+        output, errors = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 128 + number, errors)
         self.assertTrue((self.folder / "stopped/checkpoint.nephos").exists())
         return output, errors
@@ -590,7 +590,7 @@ class Signals(Case):
     def test_a_resumed_run_is_the_uninterrupted_one(self):
         changes = ["--set", "time.steps=400", "--no-render"]
         whole = self.start("run", self.long, *changes, "--out", "whole", "--threads", "1")
-        _, errors = whole.communicate(timeout=120)
+        _, errors = whole.communicate(timeout=PATIENCE)
         self.assertEqual(whole.returncode, 0, errors)
         self.interrupt(signal.SIGINT, self.long, *changes, "--out", "stopped")
         # Without --resume it is not thrown away.
@@ -600,7 +600,7 @@ class Signals(Case):
         again = self.start("run", self.long, *changes, "--out", "stopped", "--resume")
         self.wait_for(f"stopped/density/long_{done + 2:04}.vdb")
         again.send_signal(signal.SIGTERM)
-        again.communicate(timeout=60)
+        again.communicate(timeout=PATIENCE)
         self.assertIn(again.returncode, (0, 128 + signal.SIGTERM))
         self.call("run", self.long, *changes, "--out", "stopped", "--resume")
         manifest = self.same_runs("whole", "stopped")
@@ -627,7 +627,7 @@ class Signals(Case):
         time.sleep(0.4)
         begin = time.monotonic()
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=60)
+        process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 130)
         self.assertLess(time.monotonic() - begin, 1.0)
 
@@ -638,7 +638,7 @@ class Signals(Case):
         for _ in range(3):
             process.send_signal(signal.SIGINT)
             time.sleep(0.02)
-        process.communicate(timeout=60)
+        process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 130)
         self.assertTrue((self.folder / "stopped/checkpoint.nephos").exists())
 
@@ -648,7 +648,7 @@ class Signals(Case):
         for more in ([], ["--overwrite"]):
             self.refused(3, "run", self.long, "--no-render", "--out", "stopped", *more, says="another run")
         process.send_signal(signal.SIGKILL)
-        process.communicate(timeout=60)
+        process.communicate(timeout=PATIENCE)
         # The lock ends with its owner, however that ends; so do the files that it was writing.
         (self.folder / "stopped/density/.long_0003.part1-2.vdb").write_text("half")
         self.call("run", self.long, "--no-render", "--out", "stopped", "--overwrite", "--set", "time.steps=20")
@@ -671,7 +671,7 @@ class Signals(Case):
         process = self.start("hash", self.long, "--steps", "1000000000", "--json")
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=10)
+        process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 130)
 
 

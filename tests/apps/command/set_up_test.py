@@ -8,7 +8,7 @@ import stat
 import subprocess
 import unittest
 
-from case import Case, NEPHOS, SCENE, SOURCE
+from case import NEPHOS, PATIENCE, SCENE, SOURCE, Case
 
 
 class SetUp(Case):
@@ -28,7 +28,7 @@ class SetUp(Case):
         self.stand_in("id", f"echo {0 if root_user else 1000}")
         self.stand_in("sudo", 'test "$1" = -n && shift && exec "$@"' if sudo else "exit 1")
         script = f'set -euo pipefail; root="{SOURCE}"; . "{SOURCE}/apps/setup.sh"; install_packages {groups}'
-        result = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=60,
+        result = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=PATIENCE,
                                 env={**self.environment, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
         log = self.folder / "apt.log"
         calls = log.read_text().splitlines() if log.exists() else []
@@ -82,7 +82,7 @@ class SetUp(Case):
                 ([self.scene, "--splatting", "vulkan"], False, True), (["no.toml"], False, card)):
             log = self.folder / "apt.log"
             log.unlink(missing_ok=True)
-            result = subprocess.run(["./run", *arguments], cwd=self.folder, capture_output=True, text=True, timeout=60,
+            result = subprocess.run(["./run", *arguments], cwd=self.folder, capture_output=True, text=True, timeout=PATIENCE,
                                     env={**self.environment, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
             self.assertEqual(result.stdout, "".join(f"<{a}>" for a in ["run", *arguments]), result.stderr)
             installed = log.read_text() if log.exists() else ""

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import unittest
 
-from case import NEPHOS, Case
+from case import NEPHOS, PATIENCE, Case
 
 # Libraries whose symbols take most of the time of a short run.
 SLOW = ("libopenvdb", "libOpenEXR", "libblosc", "libboost_iostreams", "liblog4cplus")
@@ -82,7 +82,7 @@ class Start(Case):
         statuses = set()
         for kib in range(90_000, 240_000, 10_000):
             result = subprocess.run(["sh", "-c", f'ulimit -v {kib}; exec "$@"', "sh", NEPHOS, "info", grid], env=self.environment,
-                                    capture_output=True, text=True, timeout=60)
+                                    capture_output=True, text=True, timeout=PATIENCE)
             statuses.add(result.returncode)
             if result.returncode != 0:
                 self.assertRegex(result.stderr, "^error: a part of nephos cannot be loaded: it needs 6 threads")
@@ -102,7 +102,7 @@ class Start(Case):
         for most in range(1, 20):
             shutil.rmtree(self.folder / "limited", ignore_errors=True)
             result = subprocess.run([NEPHOS, "run", self.scene, "--out", "limited", "-q", "--splatting", "cpu", "-j", str(1 + most % 3)], cwd=self.folder,
-                                    env=self.environment, capture_output=True, text=True, timeout=60, preexec_fn=lambda most=most: drop(most))
+                                    env=self.environment, capture_output=True, text=True, timeout=PATIENCE, preexec_fn=lambda most=most: drop(most))
             statuses.add(result.returncode)
             self.assertIn(result.returncode, (0, 3), result.stderr)
             self.assertEqual(result.returncode == 0, result.stderr == "")

@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 
 import xxhash
 
-from case import Case, NEPHOS, SOURCE
+from case import NEPHOS, PATIENCE, SOURCE, Case
 
 # Without vapour cells are independent: the cover is known in closed form.
 NULL = """\
@@ -342,7 +342,7 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
         for name, text, more in (("scene", 'name = "null"\n' + NULL, arguments), ("plan", plan, [])):
             with self.subTest(name):
                 done = subprocess.run([NEPHOS, "sweep", "/dev/stdin", *more, "--out", name], input=text, text=True,
-                                      cwd=self.folder, env=self.environment, capture_output=True, timeout=120)
+                                      cwd=self.folder, env=self.environment, capture_output=True, timeout=PATIENCE)
                 self.assertEqual((done.returncode, done.stderr.count("error")), (0, 0), done.stderr)
                 self.assertEqual((self.folder / name / "runs.csv").read_bytes(),
                                  (self.folder / "file/runs.csv").read_bytes())
@@ -486,13 +486,13 @@ values = [[{ levels = [{ height_m = 0, 'from_deg' = 0, speed_m_per_s = 9e1 }] }]
         """Begins a sweep or fit, calls `act` when it has a file of records of `least` bytes, and returns its status and errors."""
         process = subprocess.Popen([NEPHOS, *map(str, arguments), "-j", "1", "--quiet"], cwd=self.folder, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True, env=self.environment)
-        out, end = self.folder / arguments[-1], time.monotonic() + 60
+        out, end = self.folder / arguments[-1], time.monotonic() + PATIENCE
         while not any(path.stat().st_size >= least for path in out.glob(records)):
             self.assertLess(time.monotonic(), end)
             self.assertIsNone(process.poll())
             time.sleep(0.002)
         act()
-        _, errors = process.communicate(timeout=200)
+        _, errors = process.communicate(timeout=PATIENCE)
         return process.returncode, errors
 
     def test_a_scene_that_is_edited_meanwhile(self):
@@ -727,7 +727,7 @@ sd = 0.05
             process = self.start(*arguments)
             time.sleep(wait)
             process.send_signal(kill)
-            process.wait(timeout=60)
+            process.wait(timeout=PATIENCE)
         shard = self.folder / "killed/shards/0000-of-0001.jsonl"
         if shard.exists():
             with open(shard, "ab") as file:
@@ -856,7 +856,7 @@ sd = 0.05
                        lambda: (self.folder / "gone").rename(self.folder / "elsewhere")):
             process = self.started("gone")
             damage()
-            process.wait(timeout=100)
+            process.wait(timeout=PATIENCE)
             self.assertEqual(process.returncode, 3)
             self.assertIn("was removed or replaced while the sweep wrote it", process.stderr.read())
 
@@ -876,7 +876,7 @@ sd = 0.05
             self.assertEqual(sorted(shards.iterdir()), files)
         self.assertEqual(self.call("sweep", "shared/sweep.toml", "--out", "shared", "--status").returncode, 0)
         process.send_signal(signal.SIGTERM)
-        process.wait(timeout=60)
+        process.wait(timeout=PATIENCE)
         self.sweep("shared")  # as soon as nobody runs it
 
     def test_tables_of_another_plan_stay(self):
@@ -945,7 +945,7 @@ sd = 0.05
             said = self.call("sweep", "busy/sweep.toml", "--out", "busy", "--overwrite", *arguments, status=3).stderr
             self.assertIn("another sweep is writing this shard", said)
         process.send_signal(signal.SIGTERM)
-        process.wait(timeout=60)
+        process.wait(timeout=PATIENCE)
         self.assertGreater((self.folder / "busy/shards/0000-of-0002.jsonl").stat().st_size, 0)
 
     def test_a_worker_leaves_the_signal_to_its_parent(self):
@@ -959,7 +959,7 @@ sd = 0.05
                     os.kill(int(child), number)
                 time.sleep(0.5)
             process.send_signal(number)
-            self.assertEqual(process.wait(timeout=60), 128 + number)
+            self.assertEqual(process.wait(timeout=PATIENCE), 128 + number)
             self.assertNotIn('"failed"', (self.folder / folder / "shards/0000-of-0001.jsonl").read_text())
 
     def test_records_that_cannot_be_used_have_a_reason(self):
@@ -988,13 +988,13 @@ sd = 0.05
         arguments = ["sweep", self.null, "--axis", "field.background.ext=0.05,0.1", "--replicates", "1", "--clouds-every", "0",
                      "--out", "crash", "-j", "1", "--steps", "30000"]
         process = self.start(*arguments)
-        deadline = time.time() + 30
+        deadline = time.time() + PATIENCE
         children = []
         while time.time() < deadline and not children:
             children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
         time.sleep(0.2)
         os.kill(int(children[0]), signal.SIGKILL)
-        self.assertEqual(process.wait(timeout=100), 1)
+        self.assertEqual(process.wait(timeout=PATIENCE), 1)
         self.assertEqual([run["status"] for run in rows(self.folder / "crash/runs.csv")], ["failed", "done"])
         failure = rows(self.folder / "crash/failures.csv")[0]
         self.assertIn("signal 9", failure["message"])

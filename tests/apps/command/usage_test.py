@@ -12,7 +12,7 @@ import subprocess
 import termios
 import unittest
 
-from case import BAD, Case, NEPHOS, SCENE
+from case import BAD, NEPHOS, PATIENCE, SCENE, Case
 
 
 class Usage(Case):
@@ -104,7 +104,7 @@ class Terminal(Case):
                 break
             shown += piece
         os.close(leader)
-        return process.wait(timeout=60), shown.decode()
+        return process.wait(timeout=PATIENCE), shown.decode()
 
     def test_progress_only_on_a_terminal(self):
         status, shown = self.on_terminal("run", self.scene, "--no-render", "--set", "time.steps=300")
@@ -160,7 +160,7 @@ class Terminal(Case):
         for arguments in calls:
             with self.subTest(arguments=arguments):
                 result = subprocess.run([NEPHOS, *arguments], cwd=self.folder, capture_output=True, text=True,
-                                        env=self.environment, timeout=120)
+                                        env=self.environment, timeout=PATIENCE)
                 shown = result.stdout + result.stderr
                 self.assertRegex(shown, r"\\(u00|x)[0-9a-f]{2}|[\uFFFD?]")
                 self.assertNotRegex(shown, "[\0-\x08\x0b-\x1f\x7f-\x9f\u202e]")
@@ -173,7 +173,7 @@ class Terminal(Case):
 
     def test_a_reader_that_goes_away_is_no_error(self):
         script = f'set -o pipefail; "{NEPHOS}" hash "{self.scene}" --steps 20000 | head -n 1'
-        result = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=60, env=self.environment)
+        result = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=PATIENCE, env=self.environment)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         self.assertRegex(result.stdout, r"^0 [0-9a-f]{32}\n$")
 
@@ -190,7 +190,7 @@ class Terminal(Case):
                                         (["validate", *[self.scene] * 40, "none.toml", "--print"], 3, "none.toml")):
             read, write = os.pipe()
             os.close(read)
-            result = subprocess.run([NEPHOS, *arguments], stdout=write, stderr=subprocess.PIPE, text=True, timeout=60, cwd=self.folder)
+            result = subprocess.run([NEPHOS, *arguments], stdout=write, stderr=subprocess.PIPE, text=True, timeout=PATIENCE, cwd=self.folder)
             os.close(write)
             self.assertEqual(result.returncode, status, result.stderr)
             self.assertIn(says, result.stderr)
@@ -198,7 +198,7 @@ class Terminal(Case):
     def test_a_full_stdout_is_an_error(self):
         with open("/dev/full", "w") as full:
             for arguments in (["hash", self.scene], ["--help"], ["completion", "bash"]):
-                result = subprocess.run([NEPHOS, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+                result = subprocess.run([NEPHOS, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, timeout=PATIENCE)
                 self.assertEqual(result.returncode, 3)
                 self.assertIn("standard output", result.stderr)
 
@@ -213,7 +213,7 @@ class Completion(Case):
             printf '%s\\n' "${{COMPREPLY[@]}}"
         """
         result = subprocess.run(["bash", "--norc", "-u", "-c", script], cwd=self.folder, capture_output=True, text=True,
-                                timeout=60)
+                                timeout=PATIENCE)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         return [line for line in result.stdout.split("\n") if line]
 
@@ -235,7 +235,7 @@ class Completion(Case):
             self.assertIn("nephos", script)
             if shutil.which(shell):
                 path = self.write(shell, script)
-                subprocess.run([shell, *arguments, path], check=True, timeout=60)
+                subprocess.run([shell, *arguments, path], check=True, timeout=PATIENCE)
 
 
 class Manual(Case):

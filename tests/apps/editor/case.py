@@ -13,6 +13,8 @@ from PIL import Image
 
 NEPHOS = os.environ["NEPHOS"]
 SOURCE = pathlib.Path(os.environ["SOURCE"])
+# Seconds after which what takes a few is taken for hanging, also on a machine that does much else.
+PATIENCE = 600
 
 
 class Screen:
@@ -55,7 +57,7 @@ class Case(unittest.TestCase):
             command = ["env", f"DISPLAY={screen.display}", *command]
         return command
 
-    def edit(self, *arguments, status=0, environment=None, timeout=540, **call):
+    def edit(self, *arguments, status=0, environment=None, timeout=PATIENCE, **call):
         """Runs the editor; returns what it printed. A hang ends it after `timeout` seconds."""
         done = subprocess.run(self.command(*arguments, **call), capture_output=True, text=True, timeout=timeout,
                               cwd=self.folder, env={**self.environment, **(environment or {})}, check=False)

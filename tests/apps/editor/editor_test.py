@@ -14,7 +14,7 @@ import unittest
 
 from PIL import Image, ImageStat
 
-from case import NEPHOS, SOURCE, Case
+from case import NEPHOS, PATIENCE, SOURCE, Case
 
 
 # Two layers: clouds of an automaton, and above them clouds that are drawn directly, so that each kind of change shows.
@@ -781,7 +781,7 @@ class Failures(Case):
                 """
             environment = {"VK_LAYER_PATH": os.environ["LAYERS"], "VK_INSTANCE_LAYERS": "VK_LAYER_NEPHOS_lost_device",
                            "NEPHOS_REFUSE_MEMORY_AFTER": str(allocations)}
-            done = subprocess.run(self.command(scene, script=script), capture_output=True, text=True, timeout=540, cwd=self.folder,
+            done = subprocess.run(self.command(scene, script=script), capture_output=True, text=True, timeout=PATIENCE, cwd=self.folder,
                                   env={**self.environment, **environment}, check=False)
             self.assertIn(done.returncode, (0, 4), (allocations, done.stdout + done.stderr))
             failures += done.returncode == 4

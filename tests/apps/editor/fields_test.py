@@ -11,7 +11,7 @@ import time
 import tomllib
 import unittest
 
-from case import NEPHOS, Screen
+from case import NEPHOS, PATIENCE, Screen
 from kept import MODELS, RECORD_WIND, WIND, Kept
 
 
@@ -290,8 +290,8 @@ class Fields(Kept):
 
     def test_scripts_without_commands_end(self):
         scene = self.models()
-        self.edit(scene, script="# nothing\n", timeout=120)
-        self.assertIn("cannot be read", self.edit(scene, "--script", self.folder, status=3, timeout=120))
+        self.edit(scene, script="# nothing\n", timeout=PATIENCE)
+        self.assertIn("cannot be read", self.edit(scene, "--script", self.folder, status=3, timeout=PATIENCE))
 
     def test_one_number_of_several_is_changed(self):
         """Its neighbours keep their digits and their form, and what is typed has all of its own."""
@@ -347,7 +347,7 @@ class Fields(Kept):
         for n in range(count.value):
             x11.XDestroyWindow(display, ctypes.c_ulong(windows[n]))
         x11.XCloseDisplay(display)
-        _, said = editor.communicate(timeout=60)
+        _, said = editor.communicate(timeout=PATIENCE)
         self.assertEqual(editor.returncode, 4, said)
         self.assertIn("the display is gone; unsaved edits are kept", said)
         self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
@@ -390,7 +390,7 @@ class Fields(Kept):
             self.wait_for(self.folder / "ready.txt", editor)
             (self.folder / "new").write_text(text.replace("= 100", "= 150"), encoding="utf-8")
             os.replace(self.folder / "new", scene)
-            said = editor.communicate(timeout=120)[1]
+            said = editor.communicate(timeout=PATIENCE)[1]
             self.assertEqual((editor.returncode, scene.read_text(encoding="utf-8")), (0, text.replace("= 100", "= 150")), leave + said)
             (self.folder / "ready.txt").unlink()
 
@@ -410,7 +410,7 @@ class Fields(Kept):
             self.wait_for(self.folder / "ready.txt", editor)
             (self.folder / "new").write_text(new, encoding="utf-8")
             os.replace(self.folder / "new", scene)
-            said = editor.communicate(timeout=120)[1]
+            said = editor.communicate(timeout=PATIENCE)[1]
             self.assertEqual(editor.returncode, 0, said)
             saved = tomllib.loads(scene.read_text(encoding="utf-8"))
             if text == sun:
@@ -541,7 +541,7 @@ class Fields(Kept):
             self.wait_for(ready, program)
             time.sleep(0.1)
             scene.write_text("seed = 77\n", encoding="utf-8")
-            errors = program.communicate(timeout=120)[1]
+            errors = program.communicate(timeout=PATIENCE)[1]
             self.assertEqual(program.returncode, 0, errors)
             self.assertIn(expected, scene.read_text(encoding="utf-8"))
 

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import time
 
-from case import Case
+from case import PATIENCE, Case
 
 MODELS = """name = "models"
 seed = 4
@@ -85,7 +85,7 @@ class Kept(Case):
         if end == signal.SIGKILL:
             self.wait_for(autosave, editor)
         editor.send_signal(end)
-        editor.communicate(timeout=60)
+        editor.communicate(timeout=PATIENCE)
         kept = autosave.read_text(encoding="utf-8")
         autosave.unlink()
         ready.unlink()

@@ -10,7 +10,7 @@ import sys
 import tomllib
 import unittest
 
-from case import NEPHOS
+from case import NEPHOS, PATIENCE
 from kept import MODELS, WIND, Kept
 
 STATE = 'seed = 4\n[lattice]\ncells = [16, 16, 12]\n'
@@ -80,7 +80,7 @@ class Opening(Kept):
         editor = subprocess.Popen(self.command(scene, script=script), cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
         self.wait_for(ready, editor)
         scene.unlink()
-        errors = editor.communicate(timeout=120)[1]
+        errors = editor.communicate(timeout=PATIENCE)[1]
         self.assertEqual(editor.returncode, 0, errors)
         self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
 
@@ -115,7 +115,7 @@ class Opening(Kept):
         scene.unlink()
         self.wait_for(asked, editor)
         scene.write_text(STATE.replace("4", "5"), encoding="utf-8")
-        errors = editor.communicate(timeout=120)[1]
+        errors = editor.communicate(timeout=PATIENCE)[1]
         self.assertEqual(editor.returncode, 0, errors)
         self.assertEqual(scene.read_text(encoding="utf-8"), STATE)
 
@@ -132,7 +132,7 @@ class Opening(Kept):
         self.wait_for(ready, editor)
         meanwhile()
         editor.terminate()
-        said = editor.communicate(timeout=60)[1]
+        said = editor.communicate(timeout=PATIENCE)[1]
         ready.unlink()
         return said
 

@@ -14,7 +14,7 @@ import unittest
 
 from PIL import Image, ImageChops, ImageStat
 
-from case import NEPHOS, Case, Screen
+from case import NEPHOS, PATIENCE, Case, Screen
 from kept import MODELS, WIND, Kept
 
 
@@ -130,7 +130,7 @@ class Safety(Kept):
         self.wait_for(self.folder / "ready.txt", editor)
         other = text.replace("seed = 4", "seed = 77")
         scene.write_text(other, encoding="utf-8")
-        _, said = editor.communicate(timeout=120)
+        _, said = editor.communicate(timeout=PATIENCE)
         self.assertEqual(editor.returncode, 0, said)
         self.assertEqual(scene.read_text(encoding="utf-8"), other)
 
@@ -185,7 +185,7 @@ class Safety(Kept):
                                   env={**self.environment, "DISPLAY": screen.display}, stderr=subprocess.PIPE, text=True)
         self.wait_for(self.folder / "ready.txt", editor)
         screen.close()
-        _, said = editor.communicate(timeout=60)
+        _, said = editor.communicate(timeout=PATIENCE)
         self.assertEqual(editor.returncode, 4, said)
         self.assertIn("the display is gone; unsaved edits are kept", said)
         self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
@@ -196,13 +196,13 @@ class Safety(Kept):
                                    ('[lattice]\ncells = [8, 8, 8]\ncell_size_m = 100\ninitial_state = "none.vdb"\n', 3, "none.vdb: No such file")):
             scene = self.folder / "p.toml"
             scene.write_text(text, encoding="utf-8")
-            said = self.edit(scene, "--screenshot", "window.png", "--after", "1", status=status, timeout=120)
+            said = self.edit(scene, "--screenshot", "window.png", "--after", "1", status=status, timeout=PATIENCE)
             self.assertIn(says, said)
             self.assertEqual(self.image("window.png").size, (1280, 800))
-        self.assertIn("script.txt:1: waited too long for a picture", self.edit(scene, script="picture y.png\n", status=1, timeout=180))
+        self.assertIn("script.txt:1: waited too long for a picture", self.edit(scene, script="picture y.png\n", status=1, timeout=PATIENCE))
         for line, says in (("random -5 1", "'-5' is no number from 0 to"), ("wait 0.1x", "'0.1x' is no number"), ("resize nan 9", "'nan' is no number"),
                            ("resize 100 1e30", "'1e30' is no number from 1 to 16384"), ("wait -1", "'-1' is no number")):
-            self.assertIn(f"script.txt:1: {says}", self.edit(scene, script=line + "\n", status=1, timeout=120))
+            self.assertIn(f"script.txt:1: {says}", self.edit(scene, script=line + "\n", status=1, timeout=PATIENCE))
 
     def test_every_new_element_is_valid(self):
         """What a `+` of the outline writes needs no hand in the text."""
@@ -549,7 +549,7 @@ class Safety(Kept):
             name = f"script-{number}.txt"
             (editor,) = [int(pid) for pid in os.listdir("/proc") if pid.isdigit() and self.is_our_editor(pid, name)]
             os.kill(editor, signal.SIGKILL)
-            program.communicate(timeout=30)
+            program.communicate(timeout=PATIENCE)
         self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
         self.edit(scene, "--validation", script="""
             wait 0.5
@@ -599,7 +599,7 @@ class Safety(Kept):
         self.wait_for(ready, program)
         (editor,) = [int(pid) for pid in os.listdir("/proc") if pid.isdigit() and self.is_our_editor(pid)]
         os.kill(editor, signal.SIGTERM)
-        program.communicate(timeout=30)
+        program.communicate(timeout=PATIENCE)
         self.assertEqual(program.returncode, 128 + signal.SIGTERM)
         autosave = self.folder / ".models.toml.autosave"
         self.assertIn("elevation_deg = 21", autosave.read_text(encoding="utf-8"))

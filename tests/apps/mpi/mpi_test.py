@@ -13,7 +13,7 @@ import numpy
 SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
 sys.path.insert(1, str(SOURCE / "tests/apps/command"))
 
-from case import Case, rows_of  # noqa: E402
+from case import PATIENCE, Case, rows_of  # noqa: E402
 
 PROGRAM = os.environ["NEPHOS_MPI"]
 SCENE = """\
@@ -43,7 +43,7 @@ class Mpi(Case):
         result = subprocess.run(
             ["mpirun", "--allow-run-as-root", "--oversubscribe", "--mca", "btl_vader_single_copy_mechanism", "none",
              "-n", str(processes), PROGRAM, *map(str, arguments)],
-            cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=280)
+            cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=PATIENCE)
         self.assertEqual(result.returncode, status, result.stdout + result.stderr)
         return result
 
@@ -69,7 +69,7 @@ class Mpi(Case):
         scene = self.write("s.toml", SCENE.format(boundaries='"periodic"', wind=""))
         with open("/dev/full", "w") as full:
             result = subprocess.run([PROGRAM, scene, "--steps", "1", "--hash"], stdout=full, stderr=subprocess.PIPE, text=True,
-                                    env=self.environment, timeout=60)
+                                    env=self.environment, timeout=PATIENCE)
         self.assertIn("standard output: cannot write", result.stderr)
         self.assertEqual(result.returncode, 3)
 

@@ -24,7 +24,7 @@ SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
 sys.path.insert(1, str(SOURCE / "tests/apps/command"))
 
 import nephos  # noqa: E402
-from case import BAD, NULL_SCENE, Case, rows_of  # noqa: E402
+from case import BAD, NULL_SCENE, PATIENCE, Case, rows_of  # noqa: E402
 
 FAIR = SOURCE / "docs/research/fair.toml"
 
@@ -41,7 +41,7 @@ class Scenes(Case):
         except ImportError:
             self.skipTest("this Python has no _xxsubinterpreters")
         code = "import _xxsubinterpreters as other\nother.run_string(other.create(), 'import nephos')"
-        result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+        result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=False)
         self.assertIn("nephos cannot be imported in a subinterpreter", result.stderr)
 
     def test_keys_are_set_on_a_copy(self):
@@ -621,7 +621,7 @@ nephos.sweep({str(FAIR)!r}, {{"field.background.ext": [0.1, 0.11, 0.12, 0.13]}},
                    "    print('child', end=' ')\n"
                    "    sys.exit(7)\n"
                    "print(os.waitstatus_to_exitcode(os.wait()[1]))\n")
-        result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+        result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE)
         self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "parent child 7\n", ""))
 
     def test_a_program_ends_while_its_daemons_work(self):
@@ -638,7 +638,7 @@ nephos.sweep({str(FAIR)!r}, {{"field.background.ext": [0.1, 0.11, 0.12, 0.13]}},
                    "threading.Thread(target=simulations[0].step, args=[10**8], daemon=True).start()\n"
                    "time.sleep(0.2)\n")
         for _ in range(10):
-            result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+            result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE)
             self.assertEqual((result.returncode, result.stderr), (0, ""))
 
 
@@ -651,7 +651,7 @@ class Documentation(Case):
         self.assertIn("import nephos", program)
         shutil.copy(FAIR, self.folder)
         result = subprocess.run([sys.executable, "-c", program], cwd=self.folder, capture_output=True, text=True,
-                                timeout=120)
+                                timeout=PATIENCE)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         shown = section.split("prints\n\n")[1]
         self.assertEqual(result.stdout, inspect.cleandoc(shown.split("\n\n")[0]) + "\n")
