@@ -71,6 +71,12 @@ class ReadFailure : public Error {
     explicit ReadFailure(const std::string& message) : Error(ErrorCode::io, message) {}
 };
 
+// A part of the program that cannot be loaded, which says nothing of any file.
+class LoadFailure : public ReadFailure {
+  public:
+    using ReadFailure::ReadFailure;
+};
+
 // Throws ReadFailure when reading from the stream of a file has just failed; its end is no failure.
 void check_reading(const std::istream& stream, const std::filesystem::path& path);
 

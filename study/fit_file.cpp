@@ -27,14 +27,6 @@
 namespace nephos {
 namespace {
 
-// Returns whether an error says nothing of these files: a part of the program cannot be loaded.
-bool is_of_program(const Error& error, const std::vector<std::filesystem::path>& files) {
-    return dynamic_cast<const ReadFailure*>(&error) != nullptr &&
-           std::ranges::none_of(files, [&](const std::filesystem::path& file) {
-               return std::string_view(error.what()).starts_with(file.string());
-           });
-}
-
 constexpr double kLargest = std::numeric_limits<double>::max(),
                  kSmallest = std::numeric_limits<double>::min();
 
@@ -77,8 +69,9 @@ std::optional<Measured> read_scene_keys(TomlTable& table, const std::filesystem:
             else
                 table.report("set", problem.message, problem.expected);
         }
+    } catch (const LoadFailure&) {
+        throw;
     } catch (const Error& error) {
-        if (is_of_program(error, {base.scene_file})) throw;
         const bool is_unread = error.code() == ErrorCode::io;
         unread += is_unread;
         table.report(is_unread ? "scene" : "layer", error.what(),
@@ -304,8 +297,9 @@ void read_target_mask(TomlTable& target, const std::filesystem::path& folder,
         for (const std::string& note : masks.notes)
             if (std::ranges::count(notes, note) == 0) notes.push_back(note);
         mean = mask_statistics(masks).statistics[statistic_index(to.statistic)];
+    } catch (const LoadFailure&) {
+        throw;
     } catch (const Error& error) {
-        if (is_of_program(error, paths)) throw;
         unread += error.code() == ErrorCode::io;
         return target.report("from", error.what(), "expected a cloud mask: .vdb, .nc or .png");
     }

@@ -17,6 +17,8 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/paths.h"
+#include "simulation/export/export.h"
+#include "simulation/run_listing.h"
 
 namespace nephos {
 namespace {
@@ -156,6 +158,21 @@ std::optional<fs::path> fit_with_file(const fs::path& file) {
             begins_with(folder / "fitted.toml", kWrittenByFit))
             return folder;
     }
+    return {};
+}
+
+std::optional<std::string> owner_of_file(const fs::path& file) {
+    const auto of = [](const char* kind, const fs::path& folder) {
+        std::error_code error;
+        fs::path whole = fs::absolute(folder, error);
+        whole = normal_path(error ? folder : whole);
+        if (!whole.has_filename()) whole = whole.parent_path();  // "a/"
+        return fmt::format("a file of the {} in {}", kind, whole.string());
+    };
+    if (const auto sweep = sweep_with_file(file)) return of("sweep", *sweep);
+    if (const auto fit = fit_with_file(file)) return of("fit", *fit);
+    if (const auto run = run_with_file(file)) return of("run", *run);
+    if (const auto exported = export_with_file(file)) return of("export", *exported);
     return {};
 }
 

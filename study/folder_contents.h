@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -37,5 +38,8 @@ void require_own(const std::filesystem::path& file, std::string_view beginning, 
 // Thread-safe.
 std::optional<std::filesystem::path> sweep_with_file(const std::filesystem::path& file);
 std::optional<std::filesystem::path> fit_with_file(const std::filesystem::path& file);
+
+// Returns whose file it is, of a sweep, fit, run or export, as what to say of it: "a file of the run in /data/out". Throws as these.
+std::optional<std::string> owner_of_file(const std::filesystem::path& file);
 
 }  // namespace nephos

@@ -25,28 +25,14 @@ constexpr std::chrono::seconds kPatience{10}, kPatienceOfEnd{20}, kLongPatience{
 constexpr double kMostPixels = 16384;
 
 const std::map<std::string, int>& commands() {  // and how many words follow at least
-    static const std::map<std::string, int> known{{"click", 1},
-                                                  {"click-at", 3},
-                                                  {"double-click-at", 3},
-                                                  {"picture", 1},
-                                                  {"drag", 3},
-                                                  {"set", 2},
-                                                  {"type", 1},
-                                                  {"key", 1},
-                                                  {"wait", 1},
-                                                  {"wait-step", 1},
-                                                  {"wait-picture", 0},
-                                                  {"screenshot", 1},
-                                                  {"hashes", 1},
-                                                  {"expect-control", 1},
-                                                  {"resize", 2},
-                                                  {"drop", 1},
-                                                  {"minimise", 0},
-                                                  {"restore", 0},
-                                                  {"random", 2},
-                                                  {"close-window", 0},
-                                                  {"expect-end", 0},
-                                                  {"quit", 0}};
+    static const std::map<std::string, int> known{{"click", 1},      {"click-at", 3},  {"double-click-at", 3},
+                                                  {"picture", 1},    {"drag", 3},      {"set", 2},
+                                                  {"type", 1},       {"key", 1},       {"patience", 1},
+                                                  {"wait", 1},       {"wait-step", 1}, {"wait-picture", 0},
+                                                  {"screenshot", 1}, {"hashes", 1},    {"expect-control", 1},
+                                                  {"resize", 2},     {"drop", 1},      {"minimise", 0},
+                                                  {"restore", 0},    {"random", 2},    {"close-window", 0},
+                                                  {"expect-end", 0}, {"quit", 0}};
     return known;
 }
 
@@ -149,10 +135,11 @@ bool Script::find(Editor& editor, const std::string& name, ImVec2& at) {
         return found_frames_ >= 3;
     }
     editor.controls.wanted = name;
-    if (Clock::now() - line_begin_ < kPatience) return false;
+    if (Clock::now() - line_begin_ < patience_ * kPatience) return false;
     std::string names;
     for (const auto& [known, place] : editor.controls.last) names += (names.empty() ? "" : ", ") + known;
-    fail("no control '" + name + "' within ten seconds; there are: " + names);
+    fail("no control '" + name + "' within " + number_text(patience_ * double(kPatience.count()), 6) +
+         " seconds; there are: " + names);
 }
 
 void Script::click(const ImVec2& at, bool ctrl) {
@@ -255,7 +242,7 @@ void Script::begin_line(Editor& editor) {
         return value;
     };
     const auto waited = [&](std::chrono::seconds most, const std::string& for_what) {
-        if (Clock::now() - line_begin_ > most) fail("waited too long for " + for_what);
+        if (Clock::now() - line_begin_ > patience_ * most) fail("waited too long for " + for_what);
     };
     ImVec2 at;
     if (command == "click") {
@@ -299,6 +286,8 @@ void Script::begin_line(Editor& editor) {
         inputs_.push_back(typed);
     } else if (command == "key") {
         press(words[1]);
+    } else if (command == "patience") {
+        patience_ = number(1, 0.1, 1000);
     } else if (command == "wait") {
         // On a slow machine a short time is less than a frame, and what is waited for needs some.
         const double seconds = number(1, 0);

@@ -11,6 +11,7 @@
 //     set NAME VALUE         types a value into a number's control, or a text's; a NAME with blanks stands in quotes
 //     type TEXT              types where the cursor is
 //     key CTRL+S             presses keys: letters, digits, SPACE, ENTER, ESCAPE, DELETE, HOME, F1 ..., with CTRL, SHIFT
+//     patience N             the lines that follow wait N times as long as is said here, on a slow machine
 //     wait SECONDS           lets time pass, and some frames of the window
 //     wait-step N            until that step is shown (a minute at most)
 //     wait-picture           until the picture is drawn with all its detail (a minute at most)
@@ -82,6 +83,7 @@ class Script {
     std::deque<Input> inputs_;
     ImVec2 mouse_{-1, -1};
     Clock::time_point line_begin_ = Clock::now();
+    double patience_ = 1;
     bool line_begun_ = false;
     ImVec2 found_at_{-1, -1};  // where a control was in the frame before
     int found_frames_ = 0;     // for how many frames

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "study/folder_contents.h"
 #include <fcntl.h>
 #include <fmt/format.h>
 
@@ -16,8 +17,6 @@
 #include "core/paths.h"
 #include "core/text.h"
 #include "scenes/format/named_files.h"
-#include "simulation/export/export.h"
-#include "simulation/run_listing.h"
 
 namespace nephos {
 namespace {
@@ -41,13 +40,14 @@ std::vector<fs::path> earlier_files(const fs::path& folder) {
     return files;
 }
 
-// Throws Error(usage) for a file of a run, an export or the scene.
+// Throws Error(usage) for a file of a run, a sweep, an export or the scene, and for a folder.
 void require_nobodys(const fs::path& file, Scene& scene) {
     const auto refuse = [&](const std::string& whose) {
         throw Error(ErrorCode::usage, fmt::format("{}: is {}: give another folder", file.string(), whose));
     };
-    if (const auto run = run_with_file(file)) refuse("a file of the run in " + run->string());
-    if (const auto exported = export_with_file(file)) refuse("a file of the export in " + exported->string());
+    if (type_at(file) == fs::file_type::directory) refuse("a folder");
+    if (type_behind(file) != fs::file_type::regular) return;
+    if (const auto owner = owner_of_file(file)) refuse(*owner);
     if (is_same_place(scene.file_places.scene_file, file)) refuse("the scene");
     for_each_file(scene, [&](const std::string& key, FileKind, const fs::path& named) {
         if (is_same_place(named, file)) refuse(fmt::format("what `{}` of the scene names", key));
@@ -66,8 +66,7 @@ fs::path cleared(const fs::path& folder, bool overwrite, Scene& scene) {
     if (!files.empty() && !overwrite)
         throw Error(ErrorCode::usage,
                     files.front().string() + ": is there already: give --overwrite, or another folder");
-    for (const fs::path& file : files)
-        if (type_behind(file) == fs::file_type::regular) require_nobodys(file, scene);
+    for (const fs::path& file : files) require_nobodys(file, scene);
     for (const fs::path& file : files)
         if (!fs::remove(file, error) && error)
             throw Error(ErrorCode::io, file.string() + ": cannot remove: " + error.message());

@@ -17,8 +17,6 @@
 #include "scenes/format/named_files.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/warnings.h"
-#include "simulation/export/export.h"
-#include "simulation/run_listing.h"
 
 namespace nephos {
 namespace {
@@ -213,19 +211,9 @@ void refuse_to_replace_files_of(Scene scene, const std::string& to) {
 }
 
 void refuse_to_replace_listed_file(const std::string& to) {
-    const auto refuse = [&](const char* kind, const std::filesystem::path& folder) {
-        std::error_code error;
-        std::filesystem::path whole = std::filesystem::absolute(folder, error);
-        whole = normal_path(error ? folder : whole);
-        if (!whole.has_filename()) whole = whole.parent_path();  // "a/"
-        throw Error(ErrorCode::usage, to + ": is a file of the " + kind + " in " + whole.string() +
-                                          ": expected the name of another one to write");
-    };
     require_file_name(to);
-    if (const auto sweep = sweep_with_file(to)) refuse("sweep", *sweep);
-    if (const auto fit = fit_with_file(to)) refuse("fit", *fit);
-    if (const auto run = run_with_file(to)) refuse("run", *run);
-    if (const auto exported = export_with_file(to)) refuse("export", *exported);
+    if (const auto owner = owner_of_file(to))
+        throw Error(ErrorCode::usage, to + ": is " + *owner + ": expected the name of another one to write");
 }
 
 void print_scene_errors(const SceneErrors& errors) {

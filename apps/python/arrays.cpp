@@ -203,7 +203,11 @@ std::string toml_text(const py::handle& value, int depth) {
         return "{" + text + "}";
     }
     // Arrays and numbers of NumPy.
-    if (py::hasattr(value, "tolist")) return toml_text(py::object(value.attr("tolist")()), depth + 1);
+    if (py::hasattr(value, "tolist")) {
+        const py::object plain = value.attr("tolist")();
+        // A long double has no other form than itself.
+        if (!py::type::of(plain).is(py::type::of(value))) return toml_text(plain, depth + 1);
+    }
     if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
         std::string text;
         for (const py::handle& entry : value)

@@ -176,7 +176,7 @@ struct LoadedDensity {
     std::optional<VdbMetadata> metadata;  // when nephos wrote the file
     VdbInfo info;                         // of all grids of the file, with VdbReadOptions::list_grids
     int refine = 1;  // voxels per cell of the lattice and axis; 1 unless the file says more
-    std::uint64_t negative = 0;  // values below 0, which were set to 0
+    std::uint64_t negative = 0;  // voxels below 0, which were set to 0
     // One sentence for each adaptation (negative values set to 0, resampling ...).
     std::vector<std::string> notes;
 };

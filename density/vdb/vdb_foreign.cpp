@@ -100,12 +100,12 @@ Extent checked_extent(std::array<double, 3> size) {
     return {int(size[0]), int(size[1]), int(size[2])};
 }
 
-// Values as a fog volume has them: inactive ones 0, none below 0. Counts what it changed.
+// Values as a fog volume has them: inactive ones 0, none below 0. Counts the voxels that it changed.
 class Sanitiser {
   public:
-    float operator()(float value) {
+    float operator()(float value, std::uint64_t voxels = 1) {
         if (!std::isfinite(value)) throw std::runtime_error("it has a density that is not a finite number");
-        if (value < 0) ++negative_;
+        if (value < 0) negative_ += voxels;
         return std::max(value, 0.0f);
     }
     std::uint64_t negative() const { return negative_; }
@@ -140,7 +140,11 @@ class Permuter {
         }
         auto tile = tree.cbeginValueOn();
         tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
-        for (; tile; ++tile) move_tile(tile.getBoundingBox(), sanitise_(*tile));
+        for (; tile; ++tile) {
+            CoordBBox box = tile.getBoundingBox();
+            box.intersect(bounds_);
+            move_tile(box, sanitise_(*tile, box.volume()));  // that of an empty box is 0
+        }
         for (auto leaf = work_.cbeginLeaf(); leaf; ++leaf)
             receiver_.leaf(leaf->origin(), leaf->buffer().data());
         return {false, sanitise_.negative()};
@@ -192,8 +196,7 @@ class Permuter {
     }
 
     // Cuts a tile along our blocks: whole ones stay tiles, the rest becomes voxels.
-    void move_tile(CoordBBox box, float value) {
-        box.intersect(bounds_);
+    void move_tile(const CoordBBox& box, float value) {
         if (value == 0 || box.empty()) return;
         const Coord a = moved(box.min()), b = moved(box.max());
         const CoordBBox target(Coord::minComponent(a, b), Coord::maxComponent(a, b));

@@ -31,7 +31,7 @@ struct ForeignGrid {
 
 struct ForeignResult {
     bool resampled = false;
-    std::uint64_t negative = 0;  // values below 0 that became 0
+    std::uint64_t negative = 0;  // voxels below 0 that became 0
 };
 
 // Converts a grid and passes it to `receiver`. Throws std::runtime_error when it cannot be represented: a

@@ -23,8 +23,9 @@ void finish_georeference(const SectionReader& reader, void* owner) {
                       "expected `latitude_deg` and `longitude_deg` of the world's origin");
     }
     if (reader.find("start_utc") != nullptr && !place.start_utc.empty() && !utc_seconds(place.start_utc)) {
-        reader.report("start_utc", reader.quoted("start_utc") + " is \"" + shortened(place.start_utc) + "\"",
-                      "expected a moment from 1900 to 2100 such as \"2024-06-21T13:50:00Z\"");
+        reader.report(
+            "start_utc", reader.quoted("start_utc") + " is \"" + shortened(place.start_utc) + "\"",
+            "expected a moment from 1900 to 2100, in whole seconds, such as \"2024-06-21T13:50:00Z\"");
         place.start_utc.clear();
     }
 }

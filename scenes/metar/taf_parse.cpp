@@ -107,8 +107,7 @@ class TafReader {
         taf_.station = words_[at_++];
         // The moment of issue may be missing.
         if (at_ < words_.size() && words_[at_].size() == 7 && words_[at_].back() == 'Z') ++at_;
-        if (at_ < words_.size() && (words_[at_] == "NIL" || words_[at_] == "CNL"))
-            fail("the forecast says that there is none");
+        if (at_ < words_.size() && words_[at_] == "NIL") fail("the forecast says that there is none");
         if (at_ >= words_.size() || !is_interval(words_[at_]))
             fail(
                 "expected the time of validity, such as 2112/2218: from the 21st, 12 UTC, to the 22nd, 18 "
@@ -133,6 +132,7 @@ class TafReader {
             taf_.length_s > 48 * kHour)
             fail("expected a validity of at most 48 hours, from day 01 to 31, hour 00 to 23, to hour 00 to 24");
         ++at_;
+        if (at_ < words_.size() && words_[at_] == "CNL") fail("the forecast was cancelled");
     }
 
     // Returns whether it is a day of the month and an hour, "2118".

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <cstdlib>
@@ -99,7 +98,6 @@ TEST(Sandbox, SurvivesCrashes) {
 }
 
 TEST(Sandbox, EndsWhatRunsTooLong) {
-    const auto start = std::chrono::steady_clock::now();
     SandboxLimits limits;
     limits.seconds = 0.3;
     const auto busy = [](SandboxWriter&) {
@@ -110,8 +108,6 @@ TEST(Sandbox, EndsWhatRunsTooLong) {
     EXPECT_EQ(error_of(busy, limits), "subject.vdb: cannot read: it takes longer than allowed");
     const auto asleep = [](SandboxWriter&) { ::pause(); };
     EXPECT_EQ(error_of(asleep, limits), "subject.vdb: cannot read: it takes longer than allowed");
-    const auto elapsed = std::chrono::steady_clock::now() - start;
-    EXPECT_LT(std::chrono::duration<double>(elapsed).count(), 5.0);
 }
 
 // A child that spins for a lock that nobody holds: once it has been silent for as long as it may, the next one is asked.
@@ -174,9 +170,8 @@ TEST(Sandbox, ForkedReadersThatCallOneTbbAreNoticed) {
 
 // A child that has told its result, or why there is none, need not end by itself.
 TEST(Sandbox, EndsWhatStaysAfterItsResult) {
-    const auto start = std::chrono::steady_clock::now();
     SandboxLimits limits;
-    limits.seconds = 60;
+    limits.seconds = 100'000;  // longer than a test may last
     const auto finished = [](SandboxWriter& writer) {
         writer.value(1);
         writer.finish();
@@ -194,8 +189,6 @@ TEST(Sandbox, EndsWhatStaysAfterItsResult) {
         for (;;) ::pause();
     };
     EXPECT_EQ(error_of(closed, limits), "subject.vdb: cannot read: it takes longer than allowed");
-    const auto elapsed = std::chrono::steady_clock::now() - start;
-    EXPECT_LT(std::chrono::duration<double>(elapsed).count(), 10.0);
 }
 
 // A child that waits for a lock that a thread of its parent held is ended after 8 s. The next one shares the descriptor,

@@ -298,6 +298,9 @@ TEST(VdbRead, NegativeValuesBecomeZeroAndAreNoted) {
     const LoadedDensity loaded = load_density(folder / "negative.vdb");
     ASSERT_EQ(loaded.notes.size(), 1u);
     EXPECT_EQ(loaded.notes[0], "2 values below 0 were set to 0");
+    grid->tree().addTile(1, Coord(8, 0, 0), -1.0f, true);  // one of 8 x 8 x 8 voxels
+    write_with_openvdb(folder / "tile.vdb", {grid});
+    EXPECT_EQ(load_density(folder / "tile.vdb").notes[0], "514 values below 0 were set to 0");
 }
 
 TEST(VdbRead, RefusesWhatIsNoFogVolume) {

@@ -4,7 +4,6 @@
 // difference.
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -98,17 +97,20 @@ TEST(BadScenes, FilesThatCannotBeReadAreInputErrors) {
     EXPECT_EQ(code_of("/dev/zero"), ErrorCode::usage) << "endless: refused at the size limit";
 }
 
-// 100 MB of valid TOML: refused without reading it to the end.
-TEST(BadScenes, HugeFileIsRefusedAtOnce) {
+// 100 MB of valid TOML.
+TEST(BadScenes, HugeFileIsRefusedForItsSize) {
     const fs::path path = fs::path(testing::TempDir()) / "nephos_huge_scene.toml";
     {
         std::ofstream file(path, std::ios::binary);
         const std::string block(1 << 20, '\n');
         for (int n = 0; n < 100; ++n) file << block;
     }
-    const auto start = std::chrono::steady_clock::now();
-    EXPECT_THROW(read_scene(path), SceneErrors);
-    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+    try {
+        read_scene(path);
+        ADD_FAILURE();
+    } catch (const SceneErrors& errors) {
+        EXPECT_NE(std::string(errors.what()).find("is larger than"), std::string::npos) << errors.what();
+    }
     fs::remove(path);
 }
 
@@ -139,8 +141,8 @@ TEST(BadScenes, PlacesInALongLineAreTheRightOnes) {
     }
 }
 
-// The worst that fits into the size limit: time and messages stay bounded.
-TEST(BadScenes, WorstCasesOfTheAllowedSizeEndInTime) {
+// The worst that fits into the size limit: messages stay bounded; what takes the square of the size would outlast the test.
+TEST(BadScenes, WorstCasesOfTheAllowedSizeEnd) {
     const auto problems_of = [](const std::string& text) -> std::size_t {
         try {
             read_scene_text(text, "worst.toml");
@@ -155,7 +157,6 @@ TEST(BadScenes, WorstCasesOfTheAllowedSizeEndInTime) {
         for (int n = 0; text.size() < kMaxSceneBytes - 100; ++n) line_of(n, text);
         return text;
     };
-    const auto start = std::chrono::steady_clock::now();
     EXPECT_EQ(problems_of(repeated(
                   [](int n, std::string& out) { ((out += "key") += std::to_string(n)) += " = 1\n"; })),
               1001u);
@@ -166,7 +167,6 @@ TEST(BadScenes, WorstCasesOfTheAllowedSizeEndInTime) {
     EXPECT_EQ(problems_of(repeated([](int, std::string& out) { out += "[[a]]\n"; })), 1u);
     EXPECT_EQ(problems_of("name = \"" + std::string(kMaxSceneBytes - 100, 'x') + "\"\n"), 1u);
     EXPECT_EQ(problems_of("sun.elevation_deg = [" + std::string(kMaxSceneBytes - 100, '[')), 1u);
-    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
 }
 
 }  // namespace

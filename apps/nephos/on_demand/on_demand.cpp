@@ -64,7 +64,7 @@ void require_room() {
     pthread_mutex_destroy(&lock);
     if (addresses != MAP_FAILED) ::munmap(addresses, kAddresses);
     if (problem != 0)
-        throw ReadFailure(std::string("a part of nephos cannot be loaded: it needs ") +
+        throw LoadFailure(std::string("a part of nephos cannot be loaded: it needs ") +
                           std::to_string(kThreads) + " threads and 80 MiB of addresses: " +
                           std::strerror(problem) + " (see the limits of `ulimit -a`)");
 }
@@ -75,12 +75,12 @@ void load_volumes() {
     const std::filesystem::path file = program_file().parent_path() / NEPHOS_VOLUMES_LIBRARY;
     void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
-        throw ReadFailure(std::string("a part of nephos cannot be loaded: ") + dlerror());
+        throw LoadFailure(std::string("a part of nephos cannot be loaded: ") + dlerror());
     }
     for (std::size_t i = 0; i < nephos_on_demand_count; ++i) {
         void* const function = dlsym(library, nephos_on_demand_names[i]);
         if (function == nullptr) {
-            throw ReadFailure(std::string("a part of nephos is of another version: ") + dlerror());
+            throw LoadFailure(std::string("a part of nephos is of another version: ") + dlerror());
         }
         nephos_on_demand_slots[i] = function;
     }

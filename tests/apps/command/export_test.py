@@ -271,10 +271,9 @@ class Export(Case):
             data = bytearray(clean[first])
             data[at] ^= value
             first.write_bytes(bytes(data))
-            begin = time.monotonic()
             result = self.call("verify", "hit", status=1)
             self.assertIn("placed_0001.nvdb: its bytes are not those that were written", result.stdout + result.stderr, at)
-            self.assertLess(time.monotonic() - begin, 60)
+            self.assertNotIn("longer than allowed", result.stdout + result.stderr, at)
             told = self.call("verify", "hit", "--json", status=1).stdout
             self.assertIn("placed_0001.nvdb", json.loads(told)["checks"][2]["detail"])
         first.write_bytes(clean[first])

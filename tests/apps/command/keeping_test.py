@@ -108,10 +108,10 @@ class Keeping(Case):
         """What --resume finds before it has the folder may be another run's work by then."""
         self.call(*self.plain, "--out", "out")
         (self.folder / "out/checkpoint.nephos").unlink()
-        late = subprocess.Popen(["strace", "-f", "-qq", "-e", "trace=flock", "-e", "inject=flock:delay_enter=3000000", "-o",
+        late = subprocess.Popen(["strace", "-f", "-qq", "-e", "trace=flock", "-e", "inject=flock:delay_enter=10000000", "-o",
                                  "/dev/null", NEPHOS, *map(str, self.plain), "--resume", "--out", "out"], cwd=self.folder,
                                 env=self.environment, stderr=subprocess.PIPE, text=True)
-        time.sleep(1)
+        time.sleep(2)
         self.call(*self.plain, "--seed", "99", "--overwrite", "--out", "out")
         _, said = late.communicate(timeout=PATIENCE)
         self.assertEqual(late.returncode, 2, said)

@@ -184,10 +184,8 @@ class Records(Case):
                                            cwd=self.folder, env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
                 time.sleep(1)
                 self.assertIsNone(process.poll())
-                begin = time.monotonic()
                 process.send_signal(signal.SIGTERM)
-                said = process.communicate(timeout=PATIENCE)[1]
-                self.assertLess(time.monotonic() - begin, 1)
+                said = process.communicate(timeout=PATIENCE)[1]  # while the lock is held still
                 self.assertEqual(process.returncode, 143)
                 self.assertIn("stopped after 0 of 1 runs", said)
         # Who has the folder later goes on.

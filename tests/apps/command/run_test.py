@@ -625,11 +625,10 @@ class Signals(Case):
         self.wait_for("slow/manifest.json")
         process.send_signal(signal.SIGINT)
         time.sleep(0.4)
-        begin = time.monotonic()
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 130)
-        self.assertLess(time.monotonic() - begin, 1.0)
+        self.assertFalse((self.folder / "slow/checkpoint.nephos").exists())  # which the first alone leaves after the step
 
     def test_a_signal_that_comes_twice_is_one(self):
         # As from the terminal and from a program between, like timeout.

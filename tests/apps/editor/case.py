@@ -43,12 +43,13 @@ class Case(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
         self.environment = {**os.environ, "XDG_CONFIG_HOME": str(self.folder / "config"), "VK_LOADER_LAYERS_ENABLE": ""}
 
-    def command(self, *arguments, script=None, display=True, size="1280x800", server=()):
-        """The words of a call of the editor. `server`: more arguments of the X server."""
+    def command(self, *arguments, script=None, display=True, size="1280x800", server=(), patient=True):
+        """The words of a call of the editor. `server`: more arguments of the X server. `patient`: the script gives up
+        only after what is a hang on any machine."""
         command = [NEPHOS, "edit", *map(str, arguments)]
         if script is not None:
             path = self.folder / "script.txt"
-            path.write_text(script, encoding="utf-8")
+            path.write_text(("patience 9\n" if patient else "") + script, encoding="utf-8")
             command += ["--script", str(path)]
         if display:
             command += ["--size", size] if size else []
@@ -59,7 +60,7 @@ class Case(unittest.TestCase):
 
     def edit(self, *arguments, status=0, environment=None, timeout=PATIENCE, **call):
         """Runs the editor; returns what it printed. A hang ends it after `timeout` seconds."""
-        done = subprocess.run(self.command(*arguments, **call), capture_output=True, text=True, timeout=timeout,
+        done = subprocess.run(self.command(*arguments, patient=status != 1, **call), capture_output=True, text=True, timeout=timeout,
                               cwd=self.folder, env={**self.environment, **(environment or {})}, check=False)
         output = done.stdout + done.stderr
         self.assertEqual(done.returncode, status, output)
