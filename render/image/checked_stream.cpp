@@ -10,11 +10,17 @@
 #include "core/error.h"
 
 namespace nephos {
+namespace {
+
+constexpr std::size_t kGathered = std::size_t(1) << 16;
+
+}  // namespace
 
 CheckedStream::CheckedStream(const std::filesystem::path& file, const std::filesystem::path& reported)
-    : Imf::OStream(file.c_str()),
-      descriptor_(::open(file.c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC)),
-      reported_(reported.string()) {
+    : Imf::OStream(file.c_str()), reported_(reported.string()) {
+    gathered_.reserve(
+        kGathered);  // later, in a destructor of the library, a lack of memory would go unnoticed
+    descriptor_ = ::open(file.c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC);
     if (descriptor_ < 0) fail(errno);
 }
 
@@ -27,19 +33,35 @@ void CheckedStream::fail(int error) {
     throw Error(ErrorCode::io, reported_ + ": cannot write: " + std::strerror(first_error_));
 }
 
-// pwrite, not write: OpenEXR goes back to fill in the offset tables.
 void CheckedStream::write(const char bytes[], int count) {
-    while (count > 0) {
-        const ssize_t written = ::pwrite(descriptor_, bytes, std::size_t(count), off_t(position_));
+    const std::string_view content(bytes, std::size_t(count));
+    if (position_ != end_ || gathered_.size() + content.size() > kGathered) flush();
+    if (content.size() > kGathered)
+        put(content, position_);
+    else
+        gathered_ += content;
+    position_ += content.size();
+    end_ = position_;
+}
+
+void CheckedStream::flush() {
+    put(gathered_, end_ - gathered_.size());
+    gathered_.clear();
+}
+
+// pwrite, not write: OpenEXR goes back to fill in the offset tables.
+void CheckedStream::put(std::string_view content, std::uint64_t at) {
+    while (!content.empty()) {
+        const ssize_t written = ::pwrite(descriptor_, content.data(), content.size(), off_t(at));
         if (written < 0 && errno == EINTR) continue;
         if (written <= 0) fail(written < 0 ? errno : ENOSPC);
-        bytes += written;
-        count -= int(written);
-        position_ += std::uint64_t(written);
+        content.remove_prefix(std::size_t(written));
+        at += std::uint64_t(written);
     }
 }
 
 void CheckedStream::close() {
+    if (first_error_ == 0) flush();
     const int result = ::close(descriptor_);
     const int error = errno;
     descriptor_ = -1;

@@ -139,7 +139,9 @@ void write_shadow_part(Imf::MultiPartOutputFile& file, const Picture& picture) {
 void require_complete(const std::filesystem::path& file) {
     Imf::MultiPartInputFile input(file.c_str());
     for (int part = 0; part < input.parts(); ++part)
-        if (!input.partComplete(part)) throw std::runtime_error("incomplete after writing");
+        if (!input.partComplete(
+                part))  // failed writes are known; what else fails goes unsaid in its destructors
+            throw std::runtime_error("incomplete after writing, as for want of memory");
 }
 
 void check_shape(const Picture& picture) {

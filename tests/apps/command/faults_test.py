@@ -109,18 +109,18 @@ class Faults(Case):
             (self.folder / "out/statistics.csv").write_text(text)
             self.refused(2, "run", self.scene, "--no-render", "--out", "out", says="statistics.csv")
 
-    def test_a_seek_that_fails_tears_no_file(self):
+    def test_grids_are_written_without_seeking(self):
+        """Failed ones of a stream's tellp() tore grids: positions are counted, and not one is asked for."""
         self.assertEqual(self.run_into("undisturbed").returncode, 0)
-        for number in (1, 2, 3, 5, 8, 13, 21):
-            with self.subTest(number=number):
-                result = self.run_into("out", env=self.failing(f"lseek EIO {number} 1", ".vdb"))
-                if result.returncode != 0:
-                    self.assertEqual(result.returncode, 3)
-                    self.assertIn("Input/output error", result.stderr)
-                    self.assertEqual(self.run_into("out").returncode, 0)
-                self.same_runs("undisturbed", "out")
-                self.no_leftovers("out")
-                shutil.rmtree(self.folder / "out")
+        result = self.run_into("out", env=self.failing("lseek EIO 1 1000000", ".vdb"))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.same_runs("undisturbed", "out")
+        self.no_leftovers("out")
+        # That of the check would be noticed: reading one back does seek.
+        result = subprocess.run([NEPHOS, "info", next((self.folder / "out/density").glob("*.vdb"))], capture_output=True, text=True,
+                                env=self.failing("lseek EIO 1 1000000", ".vdb"))
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertIn("Input/output error", result.stderr)
 
     def test_writes_of_grids_that_fail_are_told(self):
         for number in (1, 4, 7):
