@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 #include <exception>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -139,9 +140,7 @@ void write_shadow_part(Imf::MultiPartOutputFile& file, const Picture& picture) {
 void require_complete(const std::filesystem::path& file) {
     Imf::MultiPartInputFile input(file.c_str());
     for (int part = 0; part < input.parts(); ++part)
-        if (!input.partComplete(
-                part))  // failed writes are known; what else fails goes unsaid in its destructors
-            throw std::runtime_error("incomplete after writing, as for want of memory");
+        if (!input.partComplete(part)) throw std::runtime_error("incomplete after writing");
 }
 
 void check_shape(const Picture& picture) {
@@ -176,8 +175,10 @@ void write_exr(const std::filesystem::path& path, const Picture& picture, const 
             require_complete(temporary);
         } catch (const Error&) {
             throw;
-        } catch (const std::exception& reason) {
-            fail(path, "cannot write OpenEXR", reason);
+        } catch (const std::bad_alloc&) {
+            throw;
+        } catch (const std::exception& reason) {  // writes that fail are Errors
+            fail(path, "cannot write OpenEXR, as for want of memory", reason);
         }
     });
 }

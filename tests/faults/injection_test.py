@@ -49,6 +49,9 @@ REPEATED = {("write", "EINTR"), ("write", "SHORT"), ("fsync", "EINTR"), ("read",
 REASONS = {"ENOSPC": "No space left", "EIO": "Input/output error", "EINTR": "Interrupted", "EMFILE": "Too many open files",
            "ENOMEM": "memory"}
 
+# Of a sweep a run without memory is recorded as failed, and made again by --retry-failed; Open MPI ends the program itself.
+MEMORY = ("mmap", "allocate")
+
 LISTS = ("manifest.json", "export.json")  # written anew as the command proceeds
 
 LAYERS = LAYERED + """\
@@ -91,7 +94,7 @@ class Injection(unittest.TestCase):
     grows = ()  # files that get rows appended
     varies = ("manifest.json", "timing.csv")  # files that hold times
     unused = ()  # calls of WAYS that it does not make on its files
-    of_others = ()  # those that a library makes, too, which ends the program in its own way
+    of_others = ()  # those that do not fail here
     says_what_is_missing = False  # makes what it can of what it could read, and status 3
     stride = 1  # more than 1: one of so many calls fails even where all are to
     work = ()  # what stays where it cannot be listed, until the call that goes on
@@ -375,6 +378,7 @@ class Sweep(Injection):
     leftovers_stay = True
     grows = (".jsonl", ".series", "timing.csv")
     unused = ("lseek",)
+    of_others = MEMORY
 
 
 class GrownSweep(Injection):
@@ -384,6 +388,7 @@ class GrownSweep(Injection):
     leftovers_stay = True
     grows = (".jsonl", ".series", "timing.csv")
     unused = ("mkdir", "lseek")
+    of_others = MEMORY
 
     @classmethod
     def prepare(cls):
@@ -420,6 +425,7 @@ class Fit(Injection):
     leftovers_stay = True
     grows = (".jsonl", ".series", "timing.csv")
     unused = ("lseek",)
+    of_others = MEMORY
     stride = 4
 
     @classmethod
@@ -457,7 +463,7 @@ class Ranks(Injection):
     again = ("--overwrite",)
     leftovers_stay = True
     unused = ("lseek",)
-    of_others = ("mmap", "allocate")
+    of_others = MEMORY
 
 
 if __name__ == "__main__":
