@@ -543,6 +543,37 @@ TEST(VdbRead, ChunksOfNegativeSizeOverrunNothing) {
     }
 }
 
+// Blosc reads as many bytes of a chunk as the chunk's own head says, whatever room they have in memory.
+TEST(VdbRead, ChunksOfBloscThatStateAnotherSizeAreDamage) {
+    const TemporaryFolder folder;
+    auto grid = foreign_fog();
+    openvdb::initialize();
+    openvdb::io::File out((folder / "whole.vdb").string());
+    out.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+    out.write({grid});
+    out.close();
+    const std::vector<char> whole = test::bytes_of(folder / "whole.vdb");
+    constexpr std::size_t kHead = 8, kSize = 12;  // of a chunk behind its size; of the size in it
+    int chunks = 0;
+    for (std::size_t at = 100; at + 40 < whole.size(); ++at) {
+        std::int64_t size = 0;
+        std::uint32_t inner = 0;
+        std::memcpy(&size, &whole[at], sizeof size);
+        std::memcpy(&inner, &whole[at + kHead + kSize], sizeof inner);
+        if (whole[at + kHead] != 2 || size < 16 || std::int64_t(inner) != size) continue;
+        ++chunks;
+        for (const std::uint32_t stated : {inner + 1, inner - 1, 1u << 20, 0xFFFFFFFFu}) {
+            std::vector<char> damaged = whole;
+            std::memcpy(&damaged[at + kHead + kSize], &stated, sizeof stated);
+            test::write_bytes(folder / "damaged.vdb", damaged);
+            EXPECT_NE(error_of(folder / "damaged.vdb").find("states another size"), std::string::npos)
+                << error_of(folder / "damaged.vdb");
+        }
+        if (chunks == 8) break;
+    }
+    EXPECT_EQ(chunks, 8);
+}
+
 TEST(VdbRead, InfoListsEveryGrid) {
     const TemporaryFolder folder;
     const DensityGrid grid = write_own(folder / "own.vdb");
