@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "density/smoothing.h"
 #include "density/vdb/block_stream.h"
+#include "density/vdb/sanitized.h"
 #include "density/vdb/vdb_file.h"
 #include "tests/density/naive_smoothing.h"
 #include "tests/density/vdb_test_files.h"
@@ -356,7 +357,7 @@ TEST(VdbRead, HugeBoundsAreRefusedBeforeTheyCostMemory) {
     EXPECT_NE(error_of(folder / "fog.vdb", options).find("longer"), std::string::npos);
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which keep the reading process from having limits
+#if !NEPHOS_SANITIZED  // which keep the reading process from having limits
 // A length of 4 GiB for a text in the header of 100 bytes: OpenVDB makes room for it before it reads.
 TEST(VdbRead, MemoryIsBoundedByTheSizeOfTheFile) {
     const TemporaryFolder folder;
