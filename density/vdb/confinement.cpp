@@ -24,15 +24,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-// Of a sanitizer the shadow memory needs terabytes of addresses, and the reports need files. GCC defines macros, Clang
-// has features.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define NEPHOS_SANITIZED 1
-#elif defined(__has_feature)
-#define NEPHOS_SANITIZED (__has_feature(address_sanitizer) || __has_feature(thread_sanitizer))
-#else
-#define NEPHOS_SANITIZED 0
-#endif
+#include "density/vdb/sanitized.h"
 
 namespace nephos {
 namespace {

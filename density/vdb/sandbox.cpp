@@ -23,9 +23,53 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "density/vdb/confinement.h"
+#include "density/vdb/sanitized.h"
+
+#if NEPHOS_SANITIZED
+#include <cstdio>
+#include <cstdlib>
+
+#include <sanitizer/common_interface_defs.h>
+#include <sys/syscall.h>
+
+namespace {
+
+// Ends a child whose sanitizer has reported, so that its parent knows it from one that stumbled over its file. Not by _exit(), where
+// ThreadSanitizer would wait for the report to end.
+constexpr int kReported = 86;
+bool is_child = false;
+void end_reported() {
+    if (is_child) ::syscall(SYS_exit_group, kReported);
+}
+
+}  // namespace
+
+// Called by ThreadSanitizer, which goes on after a report.
+extern "C" void __tsan_on_report(void*) { end_reported(); }
+
+// Asked by GCC's sanitizer of undefined behaviour, which beside AddressSanitizer has no callback of its own: the number is kReported.
+extern "C" const char* __ubsan_default_options() { return "exitcode=86"; }
+#endif
 
 namespace nephos {
 namespace {
+
+// In the child of a sanitized build.
+void begin_reports() {
+#if NEPHOS_SANITIZED
+    is_child = true;
+    __sanitizer_set_death_callback(end_reported);
+#endif
+}
+
+// In the parent of such a build: a report is a fault of the program, and none of the file's for which there are errors.
+void end_if_reported([[maybe_unused]] int status) {
+#if NEPHOS_SANITIZED
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != kReported) return;
+    std::fputs("a sanitizer has ended the process that reads a file\n", stderr);
+    std::abort();
+#endif
+}
 
 using Clock = std::chrono::steady_clock;
 
@@ -80,6 +124,7 @@ void send_all(int fd, const void* data, std::size_t size) {
     try {
         std::vector<int> open(kept.begin(), kept.end());
         open.push_back(fd);
+        begin_reports();
         // A child before this one that was ended has left the position of the files where it was.
         for (const int file : kept)
             if (::lseek(file, 0, SEEK_SET) != 0 && errno != ESPIPE)
@@ -287,6 +332,7 @@ class Child {
         if (result == 0) return false;
         if (result < 0) status_ = 0;  // unknown
         pid_ = -1;
+        end_if_reported(status_);
         return true;
     }
 

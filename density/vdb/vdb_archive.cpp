@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include <malloc.h>
@@ -37,6 +38,19 @@ std::int64_t size_from_beginning(int fd) {
     return std::int64_t(size);
 }
 
+// Throws std::runtime_error where a chunk is one of Blosc that states another size than it has. Those of zlib begin with another
+// byte, and Blosc takes no other than its own.
+void check_blosc(std::string_view chunk) {
+    constexpr std::size_t kHead = 16, kSize = 12;
+    constexpr char kVersion = 2;
+    if (chunk.empty() || chunk[0] != kVersion) return;
+    std::uint32_t size = 0;
+    if (chunk.size() >= kHead) std::memcpy(&size, chunk.data() + kSize, sizeof size);
+    if (size != chunk.size())
+        throw std::runtime_error("it is damaged: a chunk of " + std::to_string(chunk.size()) +
+                                 " bytes states another size");
+}
+
 }  // namespace
 
 CheckedBuffer::CheckedBuffer(int fd) : FileBuffer(fd, std::ios::in | std::ios::binary) {
@@ -47,15 +61,14 @@ std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
     // Where such a size precedes, OpenVDB passes the beginning of the block that it has allocated for the voxels. All
     // blocks have room for 24 bytes, and nothing else in a file of so many follows a number of 8 bytes.
     constexpr std::streamsize kLeastBlock = 24;
-    if (negated_ > kLeastBlock && size == negated_ && ::malloc_usable_size(to) < std::size_t(size))
+    const bool is_negated =
+        number_ < 0 && number_ != std::numeric_limits<std::int64_t>::min() && size == -number_;
+    if (is_negated && size > kLeastBlock && ::malloc_usable_size(to) < std::size_t(size))
         throw std::runtime_error("it is damaged: a chunk of " + std::to_string(size) + " bytes where fewer belong");
     const std::streamsize got = FileBuffer::xsgetn(to, size);
-    negated_ = 0;
-    if (size == sizeof negated_ && got == size) {
-        std::int64_t number = 0;
-        std::memcpy(&number, to, sizeof number);
-        if (number < 0 && number != std::numeric_limits<std::int64_t>::min()) negated_ = -number;
-    }
+    if (number_ == size && got == size) check_blosc({to, std::size_t(size)});
+    number_ = 0;
+    if (size == sizeof number_ && got == size) std::memcpy(&number_, to, sizeof number_);
     return got;
 }
 

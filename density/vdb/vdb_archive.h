@@ -20,20 +20,21 @@
 namespace nephos {
 
 // An open file. OpenVDB 10.0.1 (bloscFromStream, unzipFromStream) reads as many bytes as a negative size of a chunk says
-// into a buffer of another size, and compares afterwards: such a read is refused here. Reading and seeking that the system
+// into a buffer of another size, and compares afterwards: such a read is refused here. So is a chunk of Blosc whose head states
+// another size than it has: Blosc reads as much, behind the buffer's end. Reading and seeking that the system
 // refuses throw std::ios_base::failure with its error; a stream alone has a code of its own, the same as for a damaged file.
 class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
   public:
     explicit CheckedBuffer(int fd);  // which it closes
 
   protected:
-    // Throws std::runtime_error where `to` is a block of memory that has no room.
+    // Throws std::runtime_error where `to` is a block of memory that has no room, or what was read would be read beyond its end.
     std::streamsize xsgetn(char* to, std::streamsize size) override;
     pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode which) override;
     pos_type seekpos(pos_type position, std::ios_base::openmode which) override;
 
   private:
-    std::int64_t negated_ = 0;  // the last number that was read, of 8 bytes, if it was negative
+    std::int64_t number_ = 0;  // of 8 bytes, if that was the last to be read: the size of a chunk
 };
 
 class VdbArchive : public openvdb::io::Archive {

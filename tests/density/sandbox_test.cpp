@@ -29,6 +29,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "density/vdb/sanitized.h"
 
 namespace nephos {
 namespace {
@@ -243,7 +244,7 @@ TEST(Sandbox, TimeStandsStillWhileItsReaderIsStopped) {
     EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !NEPHOS_SANITIZED
 // The limit of processor time comes before that of the clock where threads work side by side: its signal tells so, and a
 // process that the system kills would be one that is short of memory.
 TEST(Sandbox, EndsWhatComputesTooLong) {
@@ -287,7 +288,7 @@ TEST(Sandbox, NoticesAnIncompleteOrOverlongResult) {
               "");
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !NEPHOS_SANITIZED
 // What code of a stranger would do first is refused; what reading takes is not.
 TEST(Sandbox, ForbidsEverythingButReading) {
     const int kept = ::open("/proc/self/exe", O_RDONLY | O_CLOEXEC), other = ::open("/proc/self/exe", O_RDONLY | O_CLOEXEC);
@@ -336,7 +337,7 @@ TEST(Sandbox, ForbidsEverythingButReading) {
 }
 #endif
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !NEPHOS_SANITIZED
 // fork() copies private memory alone. Neither other rights nor advice may lead the child back to what is shared.
 TEST(Sandbox, CannotWriteWhatIsShared) {
     constexpr std::size_t kSize = 4096;

@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "density/smoothing.h"
 #include "density/vdb/block_stream.h"
+#include "density/vdb/sanitized.h"
 #include "density/vdb/vdb_file.h"
 #include "tests/density/naive_smoothing.h"
 #include "tests/density/vdb_test_files.h"
@@ -356,7 +357,7 @@ TEST(VdbRead, HugeBoundsAreRefusedBeforeTheyCostMemory) {
     EXPECT_NE(error_of(folder / "fog.vdb", options).find("longer"), std::string::npos);
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which keep the reading process from having limits
+#if !NEPHOS_SANITIZED  // which keep the reading process from having limits
 // A length of 4 GiB for a text in the header of 100 bytes: OpenVDB makes room for it before it reads.
 TEST(VdbRead, MemoryIsBoundedByTheSizeOfTheFile) {
     const TemporaryFolder folder;
@@ -541,6 +542,37 @@ TEST(VdbRead, ChunksOfNegativeSizeOverrunNothing) {
         }
         EXPECT_GT(chunks, 0);
     }
+}
+
+// Blosc reads as many bytes of a chunk as the chunk's own head says, whatever room they have in memory.
+TEST(VdbRead, ChunksOfBloscThatStateAnotherSizeAreDamage) {
+    const TemporaryFolder folder;
+    auto grid = foreign_fog();
+    openvdb::initialize();
+    openvdb::io::File out((folder / "whole.vdb").string());
+    out.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+    out.write({grid});
+    out.close();
+    const std::vector<char> whole = test::bytes_of(folder / "whole.vdb");
+    constexpr std::size_t kHead = 8, kSize = 12;  // of a chunk behind its size; of the size in it
+    int chunks = 0;
+    for (std::size_t at = 100; at + 40 < whole.size(); ++at) {
+        std::int64_t size = 0;
+        std::uint32_t inner = 0;
+        std::memcpy(&size, &whole[at], sizeof size);
+        std::memcpy(&inner, &whole[at + kHead + kSize], sizeof inner);
+        if (whole[at + kHead] != 2 || size < 16 || std::int64_t(inner) != size) continue;
+        ++chunks;
+        for (const std::uint32_t stated : {inner + 1, inner - 1, 1u << 20, 0xFFFFFFFFu}) {
+            std::vector<char> damaged = whole;
+            std::memcpy(&damaged[at + kHead + kSize], &stated, sizeof stated);
+            test::write_bytes(folder / "damaged.vdb", damaged);
+            EXPECT_NE(error_of(folder / "damaged.vdb").find("states another size"), std::string::npos)
+                << error_of(folder / "damaged.vdb");
+        }
+        if (chunks == 8) break;
+    }
+    EXPECT_EQ(chunks, 8);
 }
 
 TEST(VdbRead, InfoListsEveryGrid) {

@@ -9,6 +9,7 @@ import os
 import pathlib
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -28,6 +29,10 @@ NOTICED = {"asan": {**ADDRESS, **UNDEFINED, **CAST},
            "fuzz": {**ADDRESS, **UNDEFINED},
            "ubsan": {**UNDEFINED, **CAST},
            "tsan": {"race": "ThreadSanitizer: data race"}}
+IN_CHILD = {"asan": ("heap-overflow", "signed-overflow"), "fuzz": ("heap-overflow", "signed-overflow"), "ubsan": ("signed-overflow",),
+            "tsan": ("race",)}
+ENDED = "a sanitizer has ended the process that reads a file"
+CHILD = ["density/vdb/sandbox.cpp", "density/vdb/confinement.cpp", "core/text.cpp", "core/descriptor.cpp"]
 MEMCHECK = {"heap-overflow": "Invalid read of size 1", "use-after-free": "Invalid read of size 1",
             "uninitialised": "depends on uninitialised value", "leak": "definitely lost"}
 VALGRIND = ["valgrind", "--quiet", "--error-exitcode=99", "--leak-check=full", "--errors-for-leak-kinds=definite",
@@ -59,12 +64,24 @@ class Sanitizers(unittest.TestCase):
 
     def compiled(self, name, compiler, flags):
         program = self.folder / name
-        subprocess.run([compiler, "-std=c++20", "-w", *flags, HERE / "seeded_faults.cpp", "-o", program, "-pthread"], check=True)
+        if program.exists():
+            return program
+        subprocess.run([compiler, "-std=c++20", "-w", "-I", SOURCE, *flags, HERE / "seeded_faults.cpp", *(SOURCE / file for file in CHILD),
+                        "-o", program, "-pthread", "-lseccomp"], check=True)
         return program
 
-    def run_fault(self, fault, *command):
+    def program_of(self, preset):
+        """Compiled with the flags of a preset; skips where its compiler is missing."""
+        variables = presets()[preset]
+        compiler = variables.get("CMAKE_CXX_COMPILER", "g++")
+        if shutil.which(compiler) is None:
+            self.assertNotIn("NEPHOS_TEST_ALL", os.environ, "./test --all installs Clang")
+            self.skipTest(f"{compiler} is not installed")
+        return self.compiled(preset, compiler, shlex.split(variables["CMAKE_CXX_FLAGS"] + " " + variables["CMAKE_CXX_FLAGS_DEBUG"]))
+
+    def run_fault(self, fault, *command, in_child=False):
         environment = {k: v for k, v in os.environ.items() if not k.endswith("SAN_OPTIONS")}
-        return subprocess.run([*command, fault], capture_output=True, text=True, env=environment, timeout=120)
+        return subprocess.run([*command, fault, *(["in-child"] if in_child else [])], capture_output=True, text=True, env=environment, timeout=120)
 
     def test_every_preset_with_a_sanitizer_is_tried(self):
         flagged = {name for name, variables in presets().items() if "-fsanitize" in variables.get("CMAKE_CXX_FLAGS", "")}
@@ -72,20 +89,25 @@ class Sanitizers(unittest.TestCase):
 
     def test_each_notices_its_faults(self):
         for preset, faults in NOTICED.items():
-            variables = presets()[preset]
-            compiler = variables.get("CMAKE_CXX_COMPILER", "g++")
-            if shutil.which(compiler) is None:
-                self.assertNotIn("NEPHOS_TEST_ALL", os.environ, "./test --all installs Clang")
-                with self.subTest(preset=preset):
-                    self.skipTest(f"{compiler} is not installed")
-                continue
-            flags = shlex.split(variables["CMAKE_CXX_FLAGS"] + " " + variables["CMAKE_CXX_FLAGS_DEBUG"])
-            program = self.compiled(preset, compiler, flags)
-            for fault, message in faults.items():
-                with self.subTest(preset=preset, fault=fault):
-                    result = self.run_fault(fault, program)
-                    self.assertNotEqual(result.returncode, 0, result.stderr)
-                    self.assertIn(message, result.stderr)
+            with self.subTest(preset=preset):
+                program = self.program_of(preset)
+                for fault, message in faults.items():
+                    with self.subTest(fault=fault):
+                        result = self.run_fault(fault, program)
+                        self.assertNotEqual(result.returncode, 0, result.stderr)
+                        self.assertIn(message, result.stderr)
+
+    def test_a_report_in_the_process_that_reads_ends_its_parent(self):
+        """Else it would be an error of the file, which many tests expect."""
+        for preset, faults in IN_CHILD.items():
+            with self.subTest(preset=preset):
+                program = self.program_of(preset)
+                for fault in faults:
+                    with self.subTest(fault=fault):
+                        result = self.run_fault(fault, program, in_child=True)
+                        self.assertEqual(result.returncode, -signal.SIGABRT, result.stderr)
+                        self.assertIn(NOTICED[preset][fault], result.stderr)
+                        self.assertIn(ENDED, result.stderr)
 
     def test_without_one_nothing_is_noticed(self):
         """Else the messages above could come from the program itself."""
@@ -93,6 +115,7 @@ class Sanitizers(unittest.TestCase):
         for fault in sorted({*ADDRESS, *UNDEFINED, "uninitialised", "float-cast", "race"}):
             with self.subTest(fault=fault):
                 self.assertEqual(self.run_fault(fault, program).returncode, 0)
+                self.assertEqual(self.run_fault(fault, program, in_child=True).returncode, 0)
 
     @unittest.skipUnless(shutil.which("valgrind"), "Valgrind is not installed: ./test --all installs it")
     def test_valgrind_notices_its_faults(self):

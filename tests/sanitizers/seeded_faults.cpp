@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// FAULT: commits one fault of the kind that a sanitizer is there to notice, and ends with 0 if nobody does. Compiled by
-// sanitizers_test.py with the flags of each preset; nothing else may call it.
+// FAULT [in-child]: commits one fault of the kind that a sanitizer is there to notice, in the process that reads a foreign file if
+// asked to, and ends with 0 if nobody does, with 3 if what a sanitizer reported there is taken for an error of the file. Compiled
+// by sanitizers_test.py with the flags of each preset; nothing else may call it.
 
 #include <cstdint>
 #include <cstdio>
@@ -10,6 +11,9 @@
 #include <string_view>
 #include <thread>
 #include <vector>
+
+#include "core/error.h"
+#include "density/vdb/sandbox.h"
 
 namespace {
 
@@ -88,11 +92,26 @@ constexpr struct {
 }  // namespace
 
 int main(int count, char** arguments) {
+    const bool in_child = count == 3 && std::string_view(arguments[2]) == "in-child";
     for (const auto& fault : kFaults) {
-        if (count != 2 || fault.name != arguments[1]) continue;
-        fault.commit();
+        if (count < 2 || (count > 2 && !in_child) || fault.name != arguments[1]) continue;
+        if (!in_child) {
+            fault.commit();
+            return 0;
+        }
+        const auto child = [&](nephos::SandboxWriter& writer) {
+            fault.commit();
+            writer.value(1);
+        };
+        try {
+            nephos::run_sandboxed("a file", "a parser", {}, {}, child,
+                                  [](nephos::SandboxReader& reader) { reader.value<int>(); });
+        } catch (const nephos::Error& error) {
+            std::fputs(error.what(), stderr);
+            return 3;
+        }
         return 0;
     }
-    std::fputs("seeded_faults FAULT\n", stderr);
+    std::fputs("seeded_faults FAULT [in-child]\n", stderr);
     return 2;
 }
