@@ -42,17 +42,24 @@ std::size_t sum_or_most(std::size_t a, std::size_t b) {
     return a > kMost - b ? kMost : a + b;
 }
 
-// Addresses that this process uses now.
-std::size_t address_space() {
-    std::ifstream statm("/proc/self/statm");
-    std::size_t pages = 0;
-    statm >> pages;
-    return pages * std::size_t(::sysconf(_SC_PAGESIZE));
-}
-
 [[noreturn]] void fail(const std::string& step, int number) {
     throw std::runtime_error("cannot read: the process that does it cannot be confined: " + step + ": " +
                              std::strerror(number));
+}
+
+// Opens a file of this process in /proc, which a bare chroot or container may be without.
+std::ifstream open_own(const std::string& name) {
+    std::ifstream file("/proc/self/" + name);
+    if (!file) fail("it takes a mounted /proc: /proc/self/" + name, errno);
+    return file;
+}
+
+// Addresses that this process uses now.
+std::size_t address_space() {
+    std::ifstream statm = open_own("statm");
+    std::size_t pages = 0;
+    statm >> pages;
+    return pages * std::size_t(::sysconf(_SC_PAGESIZE));
 }
 
 // The soft limit is `value`, the hard one `grace` above it.
@@ -95,8 +102,7 @@ struct Mapping {
 
 std::vector<Mapping> mappings() {
     std::vector<Mapping> all;
-    std::ifstream maps("/proc/self/maps");
-    if (!maps) fail("/proc/self/maps", errno);
+    std::ifstream maps = open_own("maps");
     for (std::string line; std::getline(maps, line);) {
         std::istringstream fields(line);
         Mapping each;
