@@ -50,7 +50,7 @@ if(NEPHOS_PYTHON_DIR MATCHES "python3[.]([0-9]+)")
 endif()
 
 # Whoever links our static libraries links to what they were built with: the libraries of packages.txt.
-file(STRINGS packages.txt build_packages REGEX "^build +lib")
+file(STRINGS packages.txt build_packages REGEX "^build +[^ ]+-dev ")
 set(dev_depends "")
 foreach(line IN LISTS build_packages)
     string(REGEX REPLACE "^build +([^ ]+).*" "\\1" package "${line}")

@@ -28,7 +28,7 @@ MAY_USE = {
                     "scenes/metar", "simulation", "study"},
     "apps/editor": {"core", "automaton", "statistics", "seeds", "density", "render", "render/options", "scenes/format",
                     "simulation", "apps/nephos"},
-    "apps/mpi": {"core", "automaton", "statistics", "density", "scenes/format", "simulation", "study"},
+    "apps/mpi": {"core", "automaton", "statistics", "density", "scenes/format", "simulation", "study", "apps/nephos"},
     "apps/python": {"core", "automaton", "statistics", "density", "render", "render/options", "scenes/format", "simulation"},
 }
 # Folders of render/ from the lowest to the highest: each may include those of the rows above its own. The renderer's

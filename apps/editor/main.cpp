@@ -2,6 +2,7 @@
 
 // The program nephos-editor: `nephos edit` with its window.
 
+#include <string_view>
 #include <vector>
 
 #include "apps/editor/editor.h"
@@ -28,7 +29,9 @@ int edit(const nephos::EditArguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    std::vector<const char*> words{argc > 0 ? argv[0] : "nephos-editor", "edit"};
+    std::vector<const char*> words{argc > 0 ? argv[0] : "nephos-editor"};
+    const std::string_view first = argc > 1 ? argv[1] : "";
+    if (first != "--version" && first != "-V") words.push_back("edit");  // the version is that of the whole
     words.insert(words.end(), argv + (argc > 0 ? 1 : 0), argv + argc);
     return nephos::run_program(int(words.size()), words.data(), &edit);
 }

@@ -11,8 +11,10 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -22,12 +24,15 @@
 
 #include "apps/mpi/ranks.h"
 #include "apps/mpi/statistics_table.h"
+#include "apps/nephos/commands.h"
+#include "apps/nephos/man_page.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "density/vdb/vdb_file.h"
 #include "scenes/format/reader.h"
 #include "simulation/layer_simulation.h"
 #include "simulation/scene_files.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {
@@ -105,21 +110,29 @@ CLI::Validator whole_number(std::uint64_t max) {
                 if (error == std::errc() && last == end && number <= max) return std::string();
                 return fmt::format("'{}' is not a whole number from 0 to {}", text, max);
             },
-            "N"};
+            ""};
 }
 
-int parse(CLI::App& app, int argc, char** argv, Arguments& a) {
+void add_options(CLI::App& app, Arguments& a) {
+    app.formatter(std::make_shared<HelpPage>());
+    app.set_help_flag("-h,--help", "This page")->group("General");
+    app.set_version_flag("-V,--version", fmt::format("nephos {}", version()), "Version of nephos")
+        ->group("General");
     app.add_option("SCENE", a.scene, "Scene of one lattice, without layers")->required();
-    app.add_option("--set", a.settings, "KEY=VALUE of the scene; may be repeated")
+    app.add_option("--set", a.settings, "Change a key of the scene; may be repeated")
+        ->type_name("KEY=VALUE")
         ->expected(1)
         ->allow_extra_args(false)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     app.add_option("--seed", a.seed, "Seed instead of the scene's")
+        ->type_name("N")
         ->check(whole_number(std::numeric_limits<std::uint64_t>::max()));
     app.add_option("--steps", a.steps, "Steps instead of the scene's time.steps")
+        ->type_name("N")
         ->check(whole_number(kMaxSteps));
     app.add_flag("--hash", a.hash, "Print the state hash after every step, as `nephos hash` does");
     app.add_option("-o,--out", a.out, "Folder for statistics.csv, with a row a step")
+        ->type_name("DIR")
         ->check([](const std::string& text) {
             return text.empty() ? std::string("expected a folder") : std::string();
         });
@@ -128,16 +141,19 @@ int parse(CLI::App& app, int argc, char** argv, Arguments& a) {
     app.add_flag("--write-state", a.write_state,
                  "Write the last state's cld to --out, as VDB files of some levels each")
         ->needs("--out");
-    app.add_option("--slab-levels", a.slab_levels, "Levels of such a file")
-        ->check(CLI::Range(1, 65536))
-        ->capture_default_str();
-    app.add_option("--threads", a.threads, "Threads of each process")
-        ->check(CLI::Range(1, 1024))
-        ->capture_default_str();
+    app.add_option("--slab-levels", a.slab_levels, "Levels of such a file (default: 8)")
+        ->type_name("N")
+        ->check(CLI::Range(1, 65536).description(""));
+    app.add_option("--threads", a.threads, "Threads of each process (default: 1)")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1024).description(""));
     app.footer(
-        "Each process owns some levels, at least 8 of them; bits, hashes and statistics are those of one "
+        "Each process owns some levels, at least 8 of them; bits, hashes and statistics are those of one\n"
         "process.\n"
         "Example: mpirun -n 4 nephos-mpi large.toml --steps 100 --hash --out large");
+}
+
+int parse(CLI::App& app, int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
@@ -153,12 +169,21 @@ int parse(CLI::App& app, int argc, char** argv, Arguments& a) {
 }  // namespace nephos
 
 int main(int argc, char** argv) {
+    nephos::Arguments arguments;
+    CLI::App app("Steps one lattice on several processes", "nephos-mpi");
+    nephos::add_options(app, arguments);
+    // For the package: an option that the page does not name, and that takes no processes.
+    if (argc == 2 && std::string_view(argv[1]) == "--man") {
+        const std::string status = "0 done, 2 usage or scene, 3 input or output.";
+        const std::string page =
+            nephos::man_page(app, {"nephos-mpi", nephos::usage_line(app), status, {"nephos", "mpirun"}});
+        return std::fputs(page.c_str(), stdout) < 0 || std::fflush(stdout) != 0 ? int(nephos::ErrorCode::io)
+                                                                                : 0;
+    }
     int provided = 0, rank = 0;
     MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-    nephos::Arguments arguments;
-    CLI::App app("Steps one lattice on several processes", "nephos-mpi");
-    int status = nephos::parse(app, argc, argv, arguments);
+    int status = nephos::parse(app, argc, argv);
     if (status < 0) {
         status = 0;
         try {

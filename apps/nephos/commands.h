@@ -57,7 +57,7 @@ class HelpPage : public CLI::FormatterBase {
 // Returns "-o, --out DIR" for an option, "SCENE" for a positional.
 std::string option_label(const CLI::Option& option);
 
-// Returns "nephos run SCENE [options]".
+// Returns "nephos run SCENE [options]", "nephos COMMAND [options]", or that of a program without commands.
 std::string usage_line(const CLI::App& app);
 
 // Completion scripts for shells, generated from the parser itself, so that they cannot drift from it.

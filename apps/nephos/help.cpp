@@ -70,8 +70,8 @@ std::string option_label(const CLI::Option& option) {
 }
 
 std::string usage_line(const CLI::App& app) {
-    std::string line = "nephos";
-    if (app.get_parent() != nullptr) line += " " + app.get_name();
+    const CLI::App* parent = app.get_parent();
+    std::string line = parent == nullptr ? app.get_name() : parent->get_name() + " " + app.get_name();
     bool options = false;
     for (const CLI::Option* option : app.get_options()) {
         if (option->get_positional()) {
@@ -84,7 +84,7 @@ std::string usage_line(const CLI::App& app) {
             options = true;
         }
     }
-    if (app.get_parent() == nullptr) return line + " COMMAND [options]";
+    if (!app.get_subcommands({}).empty()) return line + " COMMAND [options]";
     return line + (options ? " [options]" : "");
 }
 

@@ -36,7 +36,8 @@ std::string troff(std::string_view text) {
 }
 
 std::string page_name(const CLI::App& app) {
-    return app.get_parent() == nullptr ? "nephos" : "nephos-" + app.get_name();
+    const CLI::App* parent = app.get_parent();
+    return parent == nullptr ? app.get_name() : parent->get_name() + "-" + app.get_name();
 }
 
 std::string entry(const std::string& label, const std::string& text) {
@@ -78,35 +79,43 @@ std::string footer_text(const CLI::App& app) {
     return fmt::format(".SH {}\n.nf\n{}\n.fi\n", examples ? "EXAMPLES" : "NOTES", troff(footer));
 }
 
-std::string see_also(const CLI::App& app) {
-    std::string out = ".SH SEE ALSO\n";
-    if (app.get_parent() != nullptr) return out + ".BR nephos (1)\n";
-    const std::vector<const CLI::App*> commands = app.get_subcommands({});
-    for (std::size_t n = 0; n < commands.size(); ++n)
-        out +=
-            fmt::format(".BR {} (1){}\n", troff(page_name(*commands[n])), n + 1 < commands.size() ? "," : "");
-    return out;
+constexpr const char* kExitStatus =
+    "0 done, 1 a check failed, 2 usage or scene, 3 input or output, 4 GPU, 130 stopped by Ctrl\\-C, 143 by "
+    "SIGTERM, 129 by SIGHUP.";
+
+// The program that `nephos edit` becomes takes its arguments.
+std::string editor_page(const CLI::App& edit) {
+    const std::string name = "nephos-editor";
+    const std::string command = edit.get_parent()->get_name() + " " + edit.get_name();
+    std::string usage = usage_line(edit);
+    usage.replace(0, command.size(), name);
+    return man_page(edit, {name, usage, kExitStatus, {"nephos", page_name(edit)}});
 }
 
 }  // namespace
 
-std::string man_page(const CLI::App& app) {
-    const std::string name = page_name(app);
-    std::string out =
-        fmt::format(".TH {} 1 \"\" \"nephos {}\" \"nephos\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n{}\n", name,
-                    version(), troff(name), troff(app.get_description()), troff(usage_line(app)));
-    if (app.get_parent() == nullptr) {
-        out += ".SH COMMANDS\n";
-        for (const CLI::App* command : app.get_subcommands({}))
-            out += entry(command->get_name(), command->get_description());
-    }
+std::string man_page(const CLI::App& app, const ManPageTexts& texts) {
+    std::string out = fmt::format(
+        ".TH {} 1 \"\" \"nephos {}\" \"nephos\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n{}\n", texts.name,
+        version(), troff(texts.name), troff(app.get_description()), troff(texts.usage));
+    const std::vector<const CLI::App*> commands = app.get_subcommands({});
+    if (!commands.empty()) out += ".SH COMMANDS\n";
+    for (const CLI::App* command : commands) out += entry(command->get_name(), command->get_description());
     out += options_text(app) + footer_text(app);
-    if (app.get_parent() != nullptr)
+    if (!texts.exit_status.empty()) out += ".SH EXIT STATUS\n" + texts.exit_status + "\n";
+    out += ".SH SEE ALSO\n";
+    for (std::size_t n = 0; n < texts.see_also.size(); ++n)
         out +=
-            ".SH EXIT STATUS\n0 done, 1 a check failed, 2 usage or scene, 3 input or output, 4 GPU, 130 "
-            "stopped by "
-            "Ctrl\\-C, 143 by SIGTERM, 129 by SIGHUP.\n";
-    return out + see_also(app);
+            fmt::format(".BR {} (1){}\n", troff(texts.see_also[n]), n + 1 < texts.see_also.size() ? "," : "");
+    return out;
+}
+
+std::string man_page(const CLI::App& app) {
+    if (app.get_parent() != nullptr)
+        return man_page(app, {page_name(app), usage_line(app), kExitStatus, {page_name(*app.get_parent())}});
+    std::vector<std::string> pages;
+    for (const CLI::App* command : app.get_subcommands({})) pages.push_back(page_name(*command));
+    return man_page(app, {page_name(app), usage_line(app), "", pages});
 }
 
 void add_man_command(CLI::App& app, Action& action) {
@@ -147,6 +156,10 @@ void add_man_command(CLI::App& app, Action& action) {
                     return 0;
                 }
                 names.push_back(page->get_name());
+            }
+            if (a->name == "nephos-editor") {
+                Output().write(editor_page(*app.get_subcommand("edit")));
+                return 0;
             }
             throw Error(ErrorCode::usage,
                         fmt::format("COMMAND '{}' is not one of {}", a->name, fmt::join(names, ", ")));

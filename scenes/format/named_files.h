@@ -27,8 +27,12 @@ enum class FileKind {
 // Scene::file_places. `document`: that the scene was read from, without problems.
 void resolve_files(Scene& scene, const Document& document, const std::filesystem::path& folder);
 
-// Returns whether a text cannot be the name of a file: it is empty, or has a byte of 0, at which the system's name would end.
-inline bool names_no_file(std::string_view text) { return text.empty() || text.find('\0') != text.npos; }
+// Returns whether a text cannot be the name of a file: it is empty, has a byte of 0, at which the system's name would end, or
+// is longer than any name that the system takes (PATH_MAX). So no message about a file, which has its whole name, is longer.
+inline constexpr std::size_t kMostNameBytes = 4095;
+inline bool names_no_file(std::string_view text) {
+    return text.empty() || text.size() > kMostNameBytes || text.find('\0') != text.npos;
+}
 
 // Throws Error(usage) for the name of a file that no text of a scene can hold, as it is no UTF-8.
 void require_scene_name(const std::filesystem::path& file);

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sections of the wind: its profile and its fields.
 
+#include <algorithm>
+
 #include "core/wind.h"
+#include "scenes/format/named_files.h"
 #include "scenes/format/schema_build.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
@@ -120,6 +123,9 @@ void finish_wind_field(const SectionReader& reader, void* owner) {
                "expected `files`, `grid`, `start_s` and `interval_s` alone with kind = \"grid\"");
         if (field.files.empty())
             reader.report("files", reader.quoted("files") + " is missing", "expected the VDB files of kind = \"grid\"");
+        if (std::ranges::any_of(field.files, names_no_file))
+            reader.report("files", reader.quoted("files") + " has a text that names no file",
+                          "expected names of VDB files");
         return;
     }
     refuse({"files", "grid", "start_s", "interval_s"}, "expected these keys with kind = \"grid\" alone");

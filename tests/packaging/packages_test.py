@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Debian packages: `cpack -G DEB` makes them, dpkg installs them into a root that holds the files of their dependencies
-alone, and there the command and the Python module work.
+alone, and there the programs and the Python module work, and programs of others are built against the libraries.
 
     BUILD=build/release SOURCE=. /usr/bin/python3 tests/packaging/packages_test.py       as root, for chroot"""
 
@@ -93,7 +93,7 @@ class Packages(unittest.TestCase):
         expected = {
             "nephos": ("/usr/bin/nephos", "/usr/lib/nephos/libnephos_volumes.so", "/usr/share/man/man1/nephos.1", "/usr/share/man/man1/nephos-run.1",
                        "/usr/share/nephos/scenes/cumulus.toml", "/usr/share/bash-completion/completions/nephos"),
-            "nephos-editor": ("/usr/bin/nephos-editor",),
+            "nephos-editor": ("/usr/bin/nephos-editor", "/usr/share/applications/nephos-editor.desktop"),
             "nephos-mpi": ("/usr/bin/nephos-mpi",),
             "libnephos-dev": ("/usr/include/nephos/simulation/simulation.h", "/usr/lib/libnephos_automaton.a",
                               "/usr/lib/cmake/nephos/nephosConfig.cmake"),
@@ -104,6 +104,8 @@ class Packages(unittest.TestCase):
             files = self.files_of(name)
             for path in expected[name]:
                 self.assertIn(path, files, name)
+            for program in (path for path in files if path.startswith("/usr/bin/")):
+                self.assertIn(f"/usr/share/man/man1/{program[9:]}.1", files, "a program without its page")
             for path, (mode, owner) in files.items():
                 self.assertNotIn(path, seen, f"in {name} and {seen.get(path)}")
                 seen[path] = name
@@ -126,18 +128,22 @@ class Packages(unittest.TestCase):
         for library in ("libopenvdb", "libtbb", "libc6", "libseccomp2", "libfmt"):
             self.assertIn(library, depends)
         self.assertIn("nephos (= ", field(self.packages["nephos-editor"], "Depends"))
-        self.assertIn("libopenvdb-dev", field(self.packages["libnephos-dev"], "Depends"))
+        for library in ("libopenvdb-dev", "nlohmann-json3-dev", "zlib1g-dev"):
+            self.assertIn(library, field(self.packages["libnephos-dev"], "Depends"))
         self.assertIn("python3-numpy", field(self.packages["python3-nephos"], "Depends"))
 
     def test_every_page_of_the_manual_is_correct_troff(self):
         tree = self.folder / "manual"
-        output("dpkg-deb", "-x", self.packages["nephos"], tree)
+        for package in self.packages.values():
+            output("dpkg-deb", "-x", package, tree)
         pages = sorted((tree / "usr/share/man/man1").glob("*"))
         self.assertGreater(len(pages), 12)
         for page in pages:
             result = subprocess.run(["groff", "-man", "-Tutf8", "-ww", page], capture_output=True, text=True)
             self.assertEqual((result.returncode, result.stderr), (0, ""), page.name)
-            self.assertIn("SYNOPSIS", re.sub(".\b", "", result.stdout))
+            text = " ".join(re.sub(".\b", "", result.stdout).split())  # justified
+            for words in (f"{page.stem}(1)", f"{page.stem} - ", "SYNOPSIS", "OPTIONS", "--help", "SEE ALSO"):
+                self.assertIn(words, text)
 
     def bare_root(self, name, packages):
         """A root with the files and the dpkg database of these packages and their dependencies, and nothing else."""
@@ -173,27 +179,37 @@ class Packages(unittest.TestCase):
         subprocess.run(["ldconfig", "-r", root], check=True)
         return root
 
-    @unittest.skipUnless(os.geteuid() == 0, "chroot takes root's rights")
-    def test_the_command_works_in_a_root_of_its_dependencies_alone(self):
-        names = [word.strip().split()[0] for package in self.packages.values() for word in field(package, "Depends").split(",")
-                 if package.name.startswith(("nephos_", "python3-nephos"))]
-        root = self.bare_root("root", [*BASE, *(name for name in names if name not in NAMES)])
-        for name in ("nephos", "python3-nephos"):
+    def root_with(self, *packages):
+        """A root of what these packages of ours depend on, with them installed."""
+        names = [word.strip().split()[0] for name in packages for word in field(self.packages[name], "Depends").split(",")]
+        root = self.bare_root("root-" + packages[0], [*BASE, *(name for name in names if name not in NAMES)])
+        for name in packages:
             # dpkg refuses a package of which a dependency is not in this root's database.
             result = subprocess.run(["dpkg", f"--root={root}", "--force-script-chrootless", "--install", self.packages[name]],
                                     capture_output=True, text=True)
             self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        return root
+
+    @unittest.skipUnless(os.geteuid() == 0, "chroot takes root's rights")
+    def test_programs_work_in_a_root_of_their_dependencies_alone(self):
+        packages = ["nephos", *sorted(NAMES - {"nephos", "libnephos-dev"})]
+        root = self.root_with(*packages)
         (root / "tmp/small.toml").write_text(SCENE)
 
-        def inside(*command):
+        def inside(*command, status=0):
             result = subprocess.run(["/usr/sbin/chroot", root, *command], capture_output=True, text=True,
                                     env={"PATH": "/usr/bin", "LC_ALL": "C.UTF-8", "HOME": "/tmp"})
-            self.assertEqual(result.returncode, 0, result.stderr)
-            return result.stdout
+            self.assertEqual(result.returncode, status, result.stdout + result.stderr)
+            return result.stdout if status == 0 else result.stderr
         self.assertRegex(inside("nephos", "--version"), r"^nephos \d")
         inside("nephos", "run", "/tmp/small.toml", "--splatting", "cpu", "--quiet", "--out", "/tmp/out")
         self.assertTrue(list((root / "tmp/out/frames").glob("*.png")))
         output(BUILD / "bin/nephos", "verify", root / "tmp/out")  # outside: reading volumes takes /proc
+        self.assertIn("takes a mounted /proc", inside("nephos", "info", "/tmp/out/density/small_0001.vdb", status=3))
+        self.assertEqual(inside("nephos-editor", "--version"), inside("nephos", "--version"))
+        self.assertIn("--screenshot", inside("nephos-editor", "--help"))
+        if "nephos-mpi" in packages:
+            self.assertIn("mpirun", inside("nephos-mpi", "--man"))
         inside("nephos", "validate", "/usr/share/nephos/scenes/cumulus.toml")
         here = output(BUILD / "bin/nephos", "hash", root / "tmp/small.toml")
         self.assertEqual(inside("nephos", "hash", "/tmp/small.toml"), here)
@@ -201,8 +217,20 @@ class Packages(unittest.TestCase):
         module, *steps = inside("python3", "-B", "/tmp/module.py").splitlines()
         self.assertEqual(module, "/usr/lib/python3/dist-packages/nephos")
         self.assertEqual(steps, here.splitlines())
-        output("dpkg", f"--root={root}", "--force-script-chrootless", "--remove", "python3-nephos", "nephos")
+        output("dpkg", f"--root={root}", "--force-script-chrootless", "--remove", *reversed(packages))
         self.assertFalse((root / "usr/bin/nephos").exists())
+
+    @unittest.skipUnless(os.geteuid() == 0, "chroot takes root's rights")
+    def test_programs_of_others_take_nothing_but_the_package_and_its_dependencies(self):
+        root = self.root_with("libnephos-dev")
+        tree = self.folder / "consumer"
+        only = [f"-DCMAKE_FIND_ROOT_PATH_MODE_{kind}=ONLY" for kind in ("PACKAGE", "LIBRARY", "INCLUDE")]
+        output("cmake", "-S", SOURCE / "tests/apps/consumer", "-B", tree, "-G", "Ninja", f"-DCMAKE_SYSROOT={root}", *only,
+               "-DCMAKE_BUILD_TYPE=Debug")
+        self.assertIn(f"nephos_DIR:PATH={root}/usr/lib/cmake/nephos", (tree / "CMakeCache.txt").read_text())
+        output("cmake", "--build", tree)
+        shutil.copy2(tree / "automaton_only", root / "tmp")
+        self.assertRegex(output("/usr/sbin/chroot", root, "/tmp/automaton_only"), "^[0-9a-f]{32}$")
 
     @unittest.skipUnless(os.geteuid() == 0, "chroot takes root's rights")
     def test_a_root_without_a_library_is_refused(self):

@@ -250,6 +250,9 @@ class Manual(Case):
         whole = self.call("man").stdout.replace("\\-", "-")
         for command in commands:
             self.assertIn(f".BR nephos-{command} (1)", whole)
+        editor = self.call("man", "nephos-editor").stdout.replace("\\-", "-")
+        self.assertIn("\nnephos-editor [SCENE] [options]\n", editor)
+        self.assertIn(".BR nephos (1),\n.BR nephos-edit (1)\n", editor)
 
     def test_all_pages_are_written_into_a_folder(self):
         self.call("man", "--out", "pages")

@@ -76,6 +76,18 @@ apron_cells = 0
         self.write("Ns.toml", "")
         self.assertIn("`models[0]` names no file", self.call("validate", scene, status=2).stderr)
 
+    def test_messages_have_the_whole_name_of_a_file_that_the_system_takes(self):
+        for key in ('models = ["{}"]', 'lattice.initial_state = "{}"', 'field.grids = [{{of = "hum", file = "{}"}}]',
+                    'ground.height_map = "{}.png"', 'wind_field = [{{kind = "grid", files = ["{}"]}}]',
+                    'model = [{{name = "Ns", seeds = [{{}}], textures = ["{}"]}}]'):
+            for length, says in ((4096, "names no file"), (3900, "a" * 3900)):
+                with self.subTest(key, length=length):
+                    scene = self.write("long.toml", "lattice.cells = [32, 24, 12]\n" + key.format("a" * length))
+                    status = 2 if length > 4095 or "models" in key else 3
+                    said = self.call("run", scene, "--splatting", "cpu", "--out", "long", status=status).stderr
+                    self.assertIn(says, said)
+                    self.assertLess(max(map(len, said.splitlines())), length + 300 if status == 3 or length < 4096 else 300)
+
     def test_set_and_seed_change_the_scene(self):
         base = self.hashes(self.scene, "--steps", "3")
         self.assertNotEqual(base, self.hashes(self.scene, "--steps", "3", "--seed", "4"))

@@ -4,6 +4,7 @@ binaries, SOURCE the source tree. Without mpirun these fail."""
 
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import unittest
@@ -46,6 +47,16 @@ class Mpi(Case):
             cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=PATIENCE)
         self.assertEqual(result.returncode, status, result.stdout + result.stderr)
         return result
+
+    def test_its_page_has_all_of_its_options(self):
+        page = subprocess.run([PROGRAM, "--man"], check=True, capture_output=True, text=True).stdout.replace("\\-", "-")
+        self.environment["NO_COLOR"] = "1"  # mpirun gives it a terminal
+        said = self.mpirun(1, "--help").stdout
+        self.assertIn("Usage: nephos-mpi SCENE [options]", said)
+        options = re.findall(r"^  (?:-\w, )?(--[a-z-]+)", said, re.M)
+        self.assertGreater(len(options), 9)
+        for option in options:
+            self.assertRegex(page, rf"(?m)^\.B .*{option}\b")
 
     def test_numbers_below_0_are_refused(self):
         scene = self.write("s.toml", SCENE.format(boundaries='"periodic"', wind=""))
