@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A hundred small scenes from one seed, for matrix_test.py: extents that are no multiples of 8, all boundaries, winds that
-change with height and time, ellipsoids, scatters, layers with clouds of base models, climates, rain, veils.
-
-    /usr/bin/python3 tests/determinism/golden_scenes.py FOLDER     writes them there"""
+change with height and time, ellipsoids, scatters, layers with clouds of base models, climates, rain, veils."""
 
 import json
 import pathlib
 import random
-import sys
 
 COUNT = 100
 SEED = 20240621
@@ -102,7 +99,7 @@ def layered(draw, scene):
     scene["layer"] = [low, high]
 
 
-def scene_text(number):
+def scene_of(number):
     draw = random.Random(f"{SEED} {number}")
     steps, step_s = draw.randint(4, 9), draw.choice([5, 10, 12.5])
     scene = {"name": f"scene-{number:03}", "seed": draw.getrandbits(63), "lattice": lattice(draw),
@@ -113,20 +110,14 @@ def scene_text(number):
     scene["density"] = {"smoothing": smoothing(draw), "metaball_radius_cells": draw.choice([1, 2, 3]),
                         "refine": draw.choice([1, 1, 1, 2]), "half": draw.random() < 0.2}
     scene["frames"] = {"per_second": 1, "time_scale": step_s * draw.choice([1.5, 2, 3])}
-    return "".join(f"{key} = {toml(value)}\n" for key, value in scene.items())
+    return scene
 
 
-def write_all(folder):
-    folder = pathlib.Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    return [write(folder, number) for number in range(COUNT)]
-
-
-def write(folder, number):
-    path = folder / f"scene-{number:03}.toml"
-    path.write_text(scene_text(number))
+def write_scene(folder, scene):
+    path = pathlib.Path(folder) / f"{scene['name']}.toml"
+    path.write_text("".join(f"{key} = {toml(value)}\n" for key, value in scene.items()))
     return path
 
 
-if __name__ == "__main__":
-    write_all(sys.argv[1])
+def write_all(folder):
+    return [write_scene(folder, scene_of(number)) for number in range(COUNT)]
