@@ -38,17 +38,24 @@ std::int64_t size_from_beginning(int fd) {
     return std::int64_t(size);
 }
 
-// Throws std::runtime_error where a chunk is one of Blosc that states another size than it has. Those of zlib begin with another
-// byte, and Blosc takes no other than its own.
+constexpr std::streamsize kBloscHead = 16;
+
+// Throws std::runtime_error where a chunk of Blosc states another size than it has. That takes no version but its own.
 void check_blosc(std::string_view chunk) {
-    constexpr std::size_t kHead = 16, kSize = 12;
+    constexpr std::size_t kSize = 12;
     constexpr char kVersion = 2;
     if (chunk.empty() || chunk[0] != kVersion) return;
     std::uint32_t size = 0;
-    if (chunk.size() >= kHead) std::memcpy(&size, chunk.data() + kSize, sizeof size);
+    if (chunk.size() >= std::size_t(kBloscHead)) std::memcpy(&size, chunk.data() + kSize, sizeof size);
     if (size != chunk.size())
         throw std::runtime_error("it is damaged: a chunk of " + std::to_string(chunk.size()) +
                                  " bytes states another size");
+}
+
+// Returns whether no value of a grid takes 8 bytes, also as half: such would stand beside chunks as the numbers of these do.
+bool has_chunks_alone(const GridBase& grid) {
+    const std::string type = grid.valueType();
+    return type == "float" || type == "bool" || type == "int32" || type == "vec3s";
 }
 
 }  // namespace
@@ -66,7 +73,8 @@ std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
     if (is_negated && size > kLeastBlock && ::malloc_usable_size(to) < std::size_t(size))
         throw std::runtime_error("it is damaged: a chunk of " + std::to_string(size) + " bytes where fewer belong");
     const std::streamsize got = FileBuffer::xsgetn(to, size);
-    if (number_ == size && got == size) check_blosc({to, std::size_t(size)});
+    if (got == size && is_chunk(size)) check_blosc({to, std::size_t(size)});
+    position_ += got;
     number_ = 0;
     if (size == sizeof number_ && got == size) std::memcpy(&number_, to, sizeof number_);
     return got;
@@ -75,12 +83,29 @@ std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
 CheckedBuffer::pos_type CheckedBuffer::seekoff(off_type offset, std::ios_base::seekdir from,
                                                std::ios_base::openmode which) {
     errno = 0;
-    return checked(FileBuffer::seekoff(offset, from, which));
+    number_ = 0;
+    const pos_type found = checked(FileBuffer::seekoff(offset, from, which));
+    position_ = std::int64_t(std::streamoff(found));
+    return found;
 }
 
 CheckedBuffer::pos_type CheckedBuffer::seekpos(pos_type position, std::ios_base::openmode which) {
     errno = 0;
-    return checked(FileBuffer::seekpos(position, which));
+    number_ = 0;
+    const pos_type found = checked(FileBuffer::seekpos(position, which));
+    position_ = std::int64_t(std::streamoff(found));
+    return found;
+}
+
+void CheckedBuffer::expect_chunks(std::ios_base& stream, std::int64_t from, std::streamsize least) {
+    stream_ = &stream;
+    from_ = from;
+    least_ = least;
+}
+
+bool CheckedBuffer::is_chunk(std::streamsize size) const {
+    return stream_ != nullptr && number_ == size && position_ >= from_ && size >= least_ &&
+           (openvdb::io::getDataCompression(*stream_) & openvdb::io::COMPRESS_BLOSC) != 0;
 }
 
 VdbArchive::VdbArchive(int fd) : buffer_(fd), stream_(&buffer_), stream_metadata_(new openvdb::io::StreamMetadata) {
@@ -126,8 +151,9 @@ void VdbArchive::read_offsets(std::int32_t count) {
         readGridCompression(stream_);
         header->readMeta(stream_);
         header->readTransform(stream_);
+        const std::int64_t voxels_at = std::int64_t(std::streamoff(stream_.tellg()));
         descriptor.seekToEnd(stream_);
-        entries_.push_back({descriptor, header});
+        entries_.push_back({descriptor, header, voxels_at});
     }
 }
 
@@ -136,12 +162,19 @@ void VdbArchive::read_sequence(std::int32_t count) {
     for (std::int32_t n = 0; n < count; ++n) {
         GridDescriptor descriptor;
         const GridBase::Ptr grid = freed_serially(descriptor.read(stream_));
-        readGrid(grid, descriptor, stream_);
+        read_voxels(grid, descriptor, 0);
         by_name[descriptor.uniqueName()] = grid;
         connectInstance(descriptor, by_name);
-        entries_.push_back({descriptor, grid});
+        entries_.push_back({descriptor, grid, 0});
         sequence_.push_back(grid);
     }
+}
+
+// `voxels_at`: where metadata and transform end, or 0. These have numbers of 8 bytes before texts, whose length takes 4.
+void VdbArchive::read_voxels(const GridBase::Ptr& grid, const GridDescriptor& descriptor, std::int64_t voxels_at) {
+    if (has_chunks_alone(*grid)) buffer_.expect_chunks(stream_, voxels_at, voxels_at > 0 ? 1 : kBloscHead);
+    readGrid(grid, descriptor, stream_);
+    buffer_.expect_no_chunks();
 }
 
 GridBase::Ptr VdbArchive::read(std::size_t n) {
@@ -150,7 +183,7 @@ GridBase::Ptr VdbArchive::read(std::size_t n) {
     const GridBase::Ptr grid = freed_serially(entries_[n].header->copyGridWithNewTree());
     grid->clearMetadata();
     descriptor.seekToGrid(stream_);
-    readGrid(grid, descriptor, stream_);
+    read_voxels(grid, descriptor, entries_[n].voxels_at);
     if (!descriptor.isInstance()) return grid;
     for (std::size_t parent = 0; parent < entries_.size(); ++parent) {
         const GridDescriptor& candidate = entries_[parent].descriptor;

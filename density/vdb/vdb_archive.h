@@ -20,12 +20,17 @@
 namespace nephos {
 
 // An open file. OpenVDB 10.0.1 (bloscFromStream, unzipFromStream) reads as many bytes as a negative size of a chunk says
-// into a buffer of another size, and compares afterwards: such a read is refused here. So is a chunk of Blosc whose head states
-// another size than it has: Blosc reads as much, behind the buffer's end. Reading and seeking that the system
+// into a buffer of another size, and compares afterwards: such a read is refused here. So is, where voxels are read, a chunk of
+// Blosc whose head states another size than it has: Blosc reads as much, behind the buffer's end. Reading and seeking that the system
 // refuses throw std::ios_base::failure with its error; a stream alone has a code of its own, the same as for a damaged file.
 class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
   public:
     explicit CheckedBuffer(int fd);  // which it closes
+
+    // Expects chunks of voxels from a position on, of at least so many bytes, where the data compression of `stream` is Blosc's.
+    // What has numbers of 8 bytes beside those of chunks may not be read then: values of such a type, in smaller ones metadata.
+    void expect_chunks(std::ios_base& stream, std::int64_t from, std::streamsize least);
+    void expect_no_chunks() { stream_ = nullptr; }
 
   protected:
     // Throws std::runtime_error where `to` is a block of memory that has no room, or what was read would be read beyond its end.
@@ -34,7 +39,13 @@ class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
     pos_type seekpos(pos_type position, std::ios_base::openmode which) override;
 
   private:
+    bool is_chunk(std::streamsize size) const;
+
     std::int64_t number_ = 0;  // of 8 bytes, if that was the last to be read: the size of a chunk
+    std::int64_t position_ = 0;
+    std::ios_base* stream_ = nullptr;
+    std::int64_t from_ = 0;
+    std::streamsize least_ = 0;
 };
 
 class VdbArchive : public openvdb::io::Archive {
@@ -45,6 +56,7 @@ class VdbArchive : public openvdb::io::Archive {
     struct Entry {
         openvdb::io::GridDescriptor descriptor;
         openvdb::GridBase::Ptr header;  // metadata and transform, no voxels
+        std::int64_t voxels_at = 0;     // where these end
     };
     const std::vector<Entry>& entries() const { return entries_; }
     const openvdb::MetaMap& metadata() const { return metadata_; }
@@ -55,6 +67,8 @@ class VdbArchive : public openvdb::io::Archive {
   private:
     void read_offsets(std::int32_t count);
     void read_sequence(std::int32_t count);
+    void read_voxels(const openvdb::GridBase::Ptr& grid, const openvdb::io::GridDescriptor& descriptor,
+                     std::int64_t voxels_at);
     void check_offsets(const openvdb::io::GridDescriptor& descriptor) const;
 
     CheckedBuffer buffer_;

@@ -575,6 +575,37 @@ TEST(VdbRead, ChunksOfBloscThatStateAnotherSizeAreDamage) {
     EXPECT_EQ(chunks, 8);
 }
 
+// Numbers of 8 bytes in metadata, before the 4 bytes of the next name's length: 4 voxels, and a name of as many letters as Blosc's
+// version or as that in the last byte of 2.
+TEST(VdbRead, MetadataAreNoChunks) {
+    const TemporaryFolder folder;
+    openvdb::initialize();
+    for (const bool with_offsets : {true, false})
+        for (const std::size_t letters : {1u, 2u, 258u}) {
+            auto grid = openvdb::FloatGrid::create();
+            grid->setName("density");
+            grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+            for (int i = 0; i < 4; ++i) grid->tree().setValue(Coord(i, 0, 0), 0.5f);
+            grid->insertMeta("file_voxel_counu", openvdb::Int64Metadata(4));
+            grid->insertMeta("file_voxel_counv" + std::string(letters, 'a'), openvdb::Int64Metadata(4));
+            grid->insertMeta(std::string(letters, 'i'), openvdb::Vec2IMetadata(openvdb::Vec2i(4, 0)));
+            grid->insertMeta(std::string(letters, 'j'), openvdb::Int64Metadata(1));
+            if (with_offsets) {
+                openvdb::io::File out((folder / "small.vdb").string());
+                out.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+                out.write({grid});
+                out.close();
+            } else {
+                std::ofstream file(folder / "small.vdb", std::ios::binary);
+                openvdb::io::Stream out(file);
+                out.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+                out.write(openvdb::GridCPtrVec{grid});
+            }
+            EXPECT_EQ(load_density(folder / "small.vdb").density.value(3, 0, 0), 0.5f) << letters;
+            EXPECT_EQ(read_vdb_info(folder / "small.vdb").grids.size(), 1u);
+        }
+}
+
 TEST(VdbRead, InfoListsEveryGrid) {
     const TemporaryFolder folder;
     const DensityGrid grid = write_own(folder / "own.vdb");
