@@ -11,7 +11,7 @@
 //     set NAME VALUE         types a value into a number's control, or a text's; a NAME with blanks stands in quotes
 //     type TEXT              types where the cursor is
 //     key CTRL+S             presses keys: letters, digits, SPACE, ENTER, ESCAPE, DELETE, HOME, F1 ..., with CTRL, SHIFT
-//     patience N             the lines that follow wait N times as long as is said here, on a slow machine
+//     patience N             the lines that follow give up on controls, steps, pictures and the end after N times as long
 //     wait SECONDS           lets time pass, and some frames of the window
 //     wait-step N            until that step is shown (a minute at most)
 //     wait-picture           until the picture is drawn with all its detail (a minute at most)

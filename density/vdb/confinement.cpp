@@ -42,7 +42,8 @@ std::size_t sum_or_most(std::size_t a, std::size_t b) {
 // Opens a file of this process in /proc, which a bare chroot or container may be without.
 std::ifstream open_own(const std::string& name) {
     std::ifstream file("/proc/self/" + name);
-    if (!file) fail("it takes a mounted /proc: /proc/self/" + name, errno);
+    if (!file)
+        fail((errno == ENOENT ? "it takes a mounted /proc: /proc/self/" : "/proc/self/") + name, errno);
     return file;
 }
 

@@ -178,7 +178,7 @@ void write_exr(const std::filesystem::path& path, const Picture& picture, const 
         } catch (const std::bad_alloc&) {
             throw;
         } catch (const std::exception& reason) {  // writes that fail are Errors
-            fail(path, "cannot write OpenEXR, as for want of memory", reason);
+            fail(path, "cannot write OpenEXR (as for want of memory)", reason);
         }
     });
 }

@@ -99,6 +99,11 @@ class TafReader {
         return n;
     }
 
+    // The word stands behind the time of validity, or in its place.
+    void refuse_cancelled() const {
+        if (at_ < words_.size() && words_[at_] == "CNL") fail("the forecast was cancelled");
+    }
+
     void read_head() {
         while (at_ < words_.size() && (words_[at_] == "TAF" || words_[at_] == "AMD" || words_[at_] == "COR"))
             ++at_;
@@ -108,6 +113,7 @@ class TafReader {
         // The moment of issue may be missing.
         if (at_ < words_.size() && words_[at_].size() == 7 && words_[at_].back() == 'Z') ++at_;
         if (at_ < words_.size() && words_[at_] == "NIL") fail("the forecast says that there is none");
+        refuse_cancelled();
         if (at_ >= words_.size() || !is_interval(words_[at_]))
             fail(
                 "expected the time of validity, such as 2112/2218: from the 21st, 12 UTC, to the 22nd, 18 "
@@ -132,7 +138,7 @@ class TafReader {
             taf_.length_s > 48 * kHour)
             fail("expected a validity of at most 48 hours, from day 01 to 31, hour 00 to 23, to hour 00 to 24");
         ++at_;
-        if (at_ < words_.size() && words_[at_] == "CNL") fail("the forecast was cancelled");
+        refuse_cancelled();
     }
 
     // Returns whether it is a day of the month and an hour, "2118".

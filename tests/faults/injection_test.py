@@ -144,6 +144,7 @@ class Injection(unittest.TestCase):
     def state(self):
         """A hash of what is left in `out`, whatever the time and the names of temporary files."""
         found, state = self.files("out"), hashlib.sha256()
+        state.update(repr(sorted(str(path.relative_to(self.folder)) for path in self.folder.glob("out/**") if path.is_dir())).encode())
         for name in sorted(found, key=lambda name: (name.split(".part")[0], found[name].suffix)):
             content, base = found[name].read_bytes(), pathlib.Path(name).name
             if base == "manifest.json":

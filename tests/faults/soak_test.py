@@ -3,7 +3,7 @@
 
     NEPHOS=... SOURCE=. python3 tests/faults/soak_test.py
 
-20,000 steps and 400 pictures; without NEPHOS_TEST_ALL=1 a fortieth of that."""
+20,000 steps and 400 pictures; without NEPHOS_TEST_ALL=1 a tenth of that."""
 
 import os
 import pathlib
@@ -15,12 +15,10 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "apps/co
 from case import NEPHOS, PATIENCE, SANITIZED, SCENE, Case  # noqa: E402
 
 ALL = os.environ.get("NEPHOS_TEST_ALL") == "1"
-STEPS = 20_000 if ALL else 500
+STEPS = 20_000 if ALL else 2_000
 STEPS_A_PICTURE = 50  # of 10 s
-# Bytes from one half to the next: what is kept of each picture, and what the allocator has not given back. A short run is
-# looked at too few times to tell less.
-MOST_GROWTH = (4 if ALL else 16) << 20
-MOST_DESCRIPTORS = 32  # with the files that are being written
+MOST_GROWTH = 4 << 20  # bytes from one half to the next: what is kept of each picture, and what the allocator has not given back
+MOST_DESCRIPTORS = 16  # with the files that are being written
 
 
 class Soak(Case):
@@ -52,7 +50,7 @@ class Soak(Case):
         self.assertEqual(process.wait(timeout=PATIENCE), 0)
         self.assertEqual(len(list((self.folder / "out/frames").glob("*.png"))), pictures)
         self.call("verify", "out")
-        self.assertGreater(len(found), 3)
+        self.assertGreater(len(found), 1)
         memory, descriptors = zip(*(found[made] for made in sorted(found)))
         half = len(found) // 2
         print(f"{STEPS} steps, {pictures} pictures: {min(memory) / 1e6:.1f} to {max(memory) / 1e6:.1f} MB, {min(descriptors)} to "

@@ -39,7 +39,7 @@ using Blocks = std::unordered_set<void*, std::hash<void*>, std::equal_to<>, From
 // Never destroyed: what ends after main() still frees memory.
 struct Watch {
     std::mutex mutex;
-    bool is_on = false;
+    bool is_on = false, ran_out = false;
     std::size_t left = 0;  // bytes that may still be taken
     unsigned char filling = 0;
     Blocks nodes;  // taken since the beginning, and not given back
@@ -57,8 +57,14 @@ WatchedMemory::WatchedMemory(std::size_t most, unsigned char filling) {
     const std::lock_guard lock(watch().mutex);
     require(!watch().is_on, "one watch at a time");
     watch().is_on = true;
+    watch().ran_out = false;
     watch().left = most;
     watch().filling = filling;
+}
+
+bool WatchedMemory::ran_out() const {
+    const std::lock_guard lock(watch().mutex);
+    return watch().ran_out;
 }
 
 WatchedMemory::~WatchedMemory() {
@@ -73,7 +79,10 @@ namespace {
 void* taken(std::size_t size) {
     Watch& all = watch();
     const std::lock_guard lock(all.mutex);
-    if (all.is_on && size > all.left) throw std::bad_alloc();
+    if (all.is_on && size > all.left) {
+        all.ran_out = true;
+        throw std::bad_alloc();
+    }
     void* const at = std::malloc(size);
     if (at == nullptr) throw std::bad_alloc();
     if (!all.is_on) return at;

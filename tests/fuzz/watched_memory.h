@@ -15,6 +15,8 @@ class WatchedMemory {
     WatchedMemory(std::size_t most, unsigned char filling);
     // Frees what is left in blocks of the size of a tree's nodes: OpenVDB loses the node that it reads when its stream throws.
     ~WatchedMemory();
+    // Returns whether memory was asked for beyond the limit.
+    bool ran_out() const;
     WatchedMemory(const WatchedMemory&) = delete;
     WatchedMemory& operator=(const WatchedMemory&) = delete;
 };

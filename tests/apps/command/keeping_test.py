@@ -108,7 +108,7 @@ class Keeping(Case):
         """What --resume finds before it has the folder may be another run's work by then."""
         self.call(*self.plain, "--out", "out")
         (self.folder / "out/checkpoint.nephos").unlink()
-        late = subprocess.Popen(["strace", "-f", "-qq", "-e", "trace=flock", "-e", "inject=flock:delay_enter=10000000", "-o",
+        late = subprocess.Popen(["strace", "-f", "-qq", "-e", "trace=flock", "-e", "inject=flock:delay_enter=10000000:when=1", "-o",
                                  "/dev/null", NEPHOS, *map(str, self.plain), "--resume", "--out", "out"], cwd=self.folder,
                                 env=self.environment, stderr=subprocess.PIPE, text=True)
         time.sleep(2)

@@ -93,7 +93,7 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
     def test_mistakes_have_a_caret(self):
         for report, word in (("EGLL 211350Z 24012KT 9999 FEWO20 14/08 Q1017", "FEWO20"), ("EGLL 321350Z 24012KT 9999", "321350Z"),
                              ("EGLL 211350Z 24012KT 28012KT 9999", "28012KT"), ("EGLL 211350Z 24012KT 9999 14/08 13/M01", "13/M01"), ("EGLL 211350Z NIL", "NIL"),
-                             ("TAF AMD EGLL 211406Z 2114/2218 CNL", "CNL"), ("EGLLX 211350Z", "EGLLX"),
+                             ("TAF AMD EGLL 211406Z 2114/2218 CNL", "CNL"), ("TAF EGLL 211406Z CNL", "CNL"), ("EGLLX 211350Z", "EGLLX"),
                              ("EGLL 211350Z 37012KT 9999", "37012KT"), ("EGLL 211350Z 24012KT 200V370 9999", "200V370"),
                              ("KJFK 211350Z 24012KT 9999999SM", "9999999SM"), ("KJFK 211350Z 24012KT 1/99999999999SM", "1/99999999999SM"),
                              ("KJFK 211350Z 24012G99999999999KT 9999", "24012G99999999999KT"),

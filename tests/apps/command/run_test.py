@@ -618,17 +618,23 @@ class Signals(Case):
                      says="--frames")
 
     def test_the_second_signal_stops_at_once(self):
-        # A scene whose single step takes seconds: the second signal must not wait for it.
-        slow = self.write("slow.toml", SCENE.replace("[32, 24, 12]", "[1024, 1024, 256]")
-                          .replace("hum = 0.15", "hum = 0.45").replace("ext = 0.05", "ext = 0.45"))
-        process = self.start("run", slow, "--no-render", "--out", "slow", "--threads", "1")
-        self.wait_for("slow/manifest.json")
+        """While the run saves what the first one asks for, in the middle of which it is held here."""
+        sanitizer = os.environ.get("LD_PRELOAD", "")
+        self.environment |= {"LD_PRELOAD": f"{sanitizer} {os.environ['FAILING_CALLS']}".strip(), "FAIL_CALL": "rename STOP 1 1",
+                             "FAIL_PATH": "checkpoint.nephos", "FAIL_PROGRAM": "nephos"}
+        process = self.start("run", self.long, "--no-render", "--out", "stopped")
+        self.wait_for("stopped/density/long_0002.vdb")
         process.send_signal(signal.SIGINT)
-        time.sleep(0.4)
+        end = time.monotonic() + PATIENCE
+        while pathlib.Path(f"/proc/{process.pid}/stat").read_text().rsplit(") ", 1)[1][0] != "T":
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.01)
+        time.sleep(0.4)  # what comes sooner is the same key
         process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGCONT)
         process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 130)
-        self.assertFalse((self.folder / "slow/checkpoint.nephos").exists())  # which the first alone leaves after the step
+        self.assertFalse((self.folder / "stopped/checkpoint.nephos").exists())
 
     def test_a_signal_that_comes_twice_is_one(self):
         # As from the terminal and from a program between, like timeout.
