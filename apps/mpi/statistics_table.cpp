@@ -40,7 +40,7 @@ std::vector<fs::path> earlier_files(const fs::path& folder) {
     return files;
 }
 
-// Throws Error(usage) for a file of a run, a sweep, an export or the scene, and for a folder.
+// Throws Error(usage) for a file of a run, a sweep, a fit, an export or the scene, and for a folder.
 void require_nobodys(const fs::path& file, Scene& scene) {
     const auto refuse = [&](const std::string& whose) {
         throw Error(ErrorCode::usage, fmt::format("{}: is {}: give another folder", file.string(), whose));
