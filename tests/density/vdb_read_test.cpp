@@ -606,6 +606,29 @@ TEST(VdbRead, MetadataAreNoChunks) {
         }
 }
 
+// Inactive values of 8 bytes before the mask of which voxel has which, of 64 or 4,096 bytes.
+TEST(VdbRead, InactiveValuesAreNoSizesOfChunks) {
+    const TemporaryFolder folder;
+    openvdb::initialize();
+    for (const std::uint32_t compression : {openvdb::io::COMPRESS_ZIP, openvdb::io::COMPRESS_BLOSC})
+        for (const std::int64_t value : {-64, -512, -4096, 64, 4096}) {
+            auto ids = openvdb::Int64Grid::create(0);
+            ids->setName("ids");
+            for (int i = 0; i < 40; ++i) {
+                ids->tree().setValueOn(Coord(3 * i, 0, 0), i);
+                ids->tree().setValueOff(Coord(3 * i + 1, 0, 0), value);
+                ids->tree().addTile(2, Coord(0, 128 * i, 0), value, i % 2 == 0);
+            }
+            std::ofstream file(folder / "ids.vdb", std::ios::binary);
+            openvdb::io::Stream out(file);
+            out.setCompression(compression | openvdb::io::COMPRESS_ACTIVE_MASK);
+            out.write(openvdb::GridCPtrVec{ids, foreign_fog()});
+            file.close();
+            EXPECT_EQ(read_vdb_info(folder / "ids.vdb").grids.size(), 2u) << value;
+            EXPECT_NO_THROW(load_density(folder / "ids.vdb")) << value;
+        }
+}
+
 TEST(VdbRead, InfoListsEveryGrid) {
     const TemporaryFolder folder;
     const DensityGrid grid = write_own(folder / "own.vdb");
