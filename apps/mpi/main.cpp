@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <iostream>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -160,7 +161,10 @@ int parse(CLI::App& app, int argc, char** argv) {
         int rank = 0;
         MPI_Comm_rank(MPI_COMM_WORLD, &rank);
         if (rank > 0) return error.get_exit_code() == 0 ? 0 : int(ErrorCode::usage);
-        return app.exit(error) == 0 ? 0 : int(ErrorCode::usage);
+        if (app.exit(error) != 0) return int(ErrorCode::usage);
+        if (std::cout.flush()) return 0;
+        std::fputs("error: standard output: cannot write\n", stderr);
+        return int(ErrorCode::io);
     }
     return -1;
 }

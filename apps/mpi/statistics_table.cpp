@@ -58,9 +58,10 @@ void require_nobodys(const fs::path& file, Scene& scene) {
 // Returns the place of the table, where nothing stands any more.
 fs::path cleared(const fs::path& folder, bool overwrite, Scene& scene) {
     std::error_code error;
-    for (const char* name : {"manifest.json", "checkpoint.nephos", "sweep.toml", "shards"})
+    for (const char* name :
+         {"manifest.json", "checkpoint.nephos", "sweep.toml", "shards", "export.json", "fit.json"})
         if (fs::exists(fs::symlink_status(folder / name, error)))
-            throw Error(ErrorCode::usage, fmt::format("{}: holds a run or a sweep ({}): give another folder",
+            throw Error(ErrorCode::usage, fmt::format("{}: holds {} of another command: give another folder",
                                                       folder.string(), name));
     const std::vector<fs::path> files = earlier_files(folder);
     if (!files.empty() && !overwrite)

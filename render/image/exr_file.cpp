@@ -140,7 +140,7 @@ void write_shadow_part(Imf::MultiPartOutputFile& file, const Picture& picture) {
 void require_complete(const std::filesystem::path& file) {
     Imf::MultiPartInputFile input(file.c_str());
     for (int part = 0; part < input.parts(); ++part)
-        if (!input.partComplete(part)) throw std::runtime_error("incomplete after writing");
+        if (!input.partComplete(part)) throw std::runtime_error("incomplete, as for want of memory");
 }
 
 void check_shape(const Picture& picture) {
@@ -164,6 +164,8 @@ void write_exr(const std::filesystem::path& path, const Picture& picture, const 
     const Imf::Header headers[2] = {picture_header(picture, options, metadata),
                                     shadow_header(picture, metadata)};
     write_atomically(path, [&](const std::filesystem::path& temporary) {
+        // Writes that fail are Errors; what else fails in the library is memory, of its compression above all.
+        const char* what = "cannot write OpenEXR (as for want of memory)";
         try {
             CheckedStream stream(temporary, path);
             {
@@ -172,13 +174,14 @@ void write_exr(const std::filesystem::path& path, const Picture& picture, const 
                 write_shadow_part(file, picture);
             }
             stream.close();
+            what = "cannot read the OpenEXR file that was written";
             require_complete(temporary);
         } catch (const Error&) {
             throw;
         } catch (const std::bad_alloc&) {
             throw;
-        } catch (const std::exception& reason) {  // writes that fail are Errors
-            fail(path, "cannot write OpenEXR (as for want of memory)", reason);
+        } catch (const std::exception& reason) {
+            fail(path, what, reason);
         }
     });
 }

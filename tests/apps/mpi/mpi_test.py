@@ -76,13 +76,14 @@ class Mpi(Case):
             self.assertIn(f"{processes} processes of this machine with {65536 // processes} levels each", said)
             self.assertIn("are all there is", said)
 
-    def test_hashes_that_cannot_be_printed(self):
+    def test_what_cannot_be_printed(self):
         scene = self.write("s.toml", SCENE.format(boundaries='"periodic"', wind=""))
-        with open("/dev/full", "w") as full:
-            result = subprocess.run([PROGRAM, scene, "--steps", "1", "--hash"], stdout=full, stderr=subprocess.PIPE, text=True,
-                                    env=self.environment, timeout=PATIENCE)
-        self.assertIn("standard output: cannot write", result.stderr)
-        self.assertEqual(result.returncode, 3)
+        for arguments in ([scene, "--steps", "1", "--hash"], ["--help"], ["--version"]):
+            with open("/dev/full", "w") as full:
+                result = subprocess.run([PROGRAM, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, env=self.environment,
+                                        timeout=PATIENCE)
+            self.assertIn("standard output: cannot write", result.stderr)
+            self.assertEqual(result.returncode, 3)
 
     def test_what_is_in_the_folder_stays(self):
         """A run, a table of an earlier call, links and pipes."""
@@ -90,7 +91,7 @@ class Mpi(Case):
         self.call("run", scene, "--no-render", "--set", "time.steps=3", "--out", "run")
         table = (self.folder / "run/statistics.csv").read_bytes()
         for more in ((), ("--overwrite",)):
-            self.assertIn("holds a run", self.mpirun(1, scene, "--out", "run", *more, status=2).stderr)
+            self.assertIn("holds manifest.json of another command", self.mpirun(1, scene, "--out", "run", *more, status=2).stderr)
         self.assertEqual((self.folder / "run/statistics.csv").read_bytes(), table)
         levels = ("--steps", "2", "--write-state", "--slab-levels")
         self.mpirun(2, scene, "--out", "mpi", *levels, 8)
@@ -102,7 +103,10 @@ class Mpi(Case):
         # Levels that are an export's, or what the scene names.
         next((self.folder / "run/density").iterdir()).rename(self.folder / "levels_10000.vdb")
         self.call("export", "levels_10000.vdb", "--to", "vdb", "-o", "exported", "-q")
-        self.assertIn("is a file of the export in ", self.mpirun(1, scene, "--steps", "1", "--out", "exported", "--overwrite", status=2).stderr)
+        self.assertIn("holds export.json", self.mpirun(1, scene, "--steps", "1", "--out", "exported", "--overwrite", status=2).stderr)
+        (self.folder / "linked").mkdir()
+        (self.folder / "linked/levels_00001.vdb").symlink_to(next((self.folder / "exported").glob("*.vdb")))
+        self.assertIn("is a file of the export in ", self.mpirun(1, scene, "--steps", "1", "--out", "linked", "--overwrite", status=2).stderr)
         self.call("verify", "exported")
         (self.folder / "mpi/levels_00099.vdb").mkdir()
         self.assertIn("levels_00099.vdb: is a folder", self.mpirun(1, scene, "--steps", "1", "--out", "mpi", "--overwrite", status=2).stderr)
