@@ -60,7 +60,7 @@ fs::path cleared(const fs::path& folder, bool overwrite, Scene& scene) {
     std::error_code error;
     for (const char* name :
          {"manifest.json", "checkpoint.nephos", "sweep.toml", "shards", "export.json", "fit.json"})
-        if (fs::exists(fs::symlink_status(folder / name, error)))
+        if (stands_there(folder / name))
             throw Error(ErrorCode::usage, fmt::format("{}: holds {} of another command: give another folder",
                                                       folder.string(), name));
     const std::vector<fs::path> files = earlier_files(folder);

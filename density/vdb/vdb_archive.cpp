@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include <malloc.h>
+#include <openvdb/io/DelayedLoadMetadata.h>
 #include <unistd.h>
 
 #include "density/vdb/serial_tree.h"
@@ -38,30 +39,22 @@ std::int64_t size_from_beginning(int fd) {
     return std::int64_t(size);
 }
 
-// Returns whether memory is a caller's own, on the stack, whose last frame is given: those of OpenVDB take a few KiB.
-bool is_of_caller(const char* memory, const void* frame) {
-    constexpr std::uintptr_t kFrames = std::uintptr_t(64) << 10;
-    return reinterpret_cast<std::uintptr_t>(memory) - reinterpret_cast<std::uintptr_t>(frame) < kFrames;
-}
-
-constexpr std::streamsize kBloscHead = 16;
-
 // Throws std::runtime_error where a chunk of Blosc states another size than it has. That takes no version but its own.
 void check_blosc(std::string_view chunk) {
-    constexpr std::size_t kSize = 12;
+    constexpr std::size_t kHead = 16, kSize = 12;
     constexpr char kVersion = 2;
     if (chunk.empty() || chunk[0] != kVersion) return;
     std::uint32_t size = 0;
-    if (chunk.size() >= std::size_t(kBloscHead)) std::memcpy(&size, chunk.data() + kSize, sizeof size);
+    if (chunk.size() >= kHead) std::memcpy(&size, chunk.data() + kSize, sizeof size);
     if (size != chunk.size())
         throw std::runtime_error("it is damaged: a chunk of " + std::to_string(chunk.size()) +
                                  " bytes states another size");
 }
 
-// Returns whether no value of a grid takes 8 bytes, also as half: such would stand beside chunks as the numbers of these do.
-bool has_chunks_alone(const GridBase& grid) {
-    const std::string type = grid.valueType();
-    return type == "float" || type == "bool" || type == "int32" || type == "vec3s";
+// Returns whether memory lies on the stack between two frames.
+bool is_between(const void* last_frame, const void* memory, const void* first_frame) {
+    const auto place = [](const void* at) { return reinterpret_cast<std::uintptr_t>(at); };
+    return place(last_frame) <= place(memory) && place(memory) < place(first_frame);
 }
 
 }  // namespace
@@ -71,19 +64,18 @@ CheckedBuffer::CheckedBuffer(int fd) : FileBuffer(fd, std::ios::in | std::ios::b
 }
 
 std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
+    const bool is_on_stack = is_between(__builtin_frame_address(0), to, frame_);
     // Where such a size precedes, OpenVDB passes the beginning of the block that it has allocated for the voxels. All
-    // blocks have room for 24 bytes. What else may follow a number of 8 bytes, an inactive value, is a mask on the stack.
+    // blocks have room for 24 bytes.
     constexpr std::streamsize kLeastBlock = 24;
     const bool is_negated =
         number_ < 0 && number_ != std::numeric_limits<std::int64_t>::min() && size == -number_;
-    const auto has_no_room = [&] { return ::malloc_usable_size(to) < std::size_t(size); };
-    if (is_negated && size > kLeastBlock && !is_of_caller(to, __builtin_frame_address(0)) && has_no_room())
+    if (!is_on_stack && is_negated && size > kLeastBlock && ::malloc_usable_size(to) < std::size_t(size))
         throw std::runtime_error("it is damaged: a chunk of " + std::to_string(size) + " bytes where fewer belong");
     const std::streamsize got = FileBuffer::xsgetn(to, size);
-    if (got == size && is_chunk(size)) check_blosc({to, std::size_t(size)});
-    position_ += got;
+    if (!is_on_stack && number_ == size && got == size && has_blosc()) check_blosc({to, std::size_t(size)});
     number_ = 0;
-    if (size == sizeof number_ && got == size) std::memcpy(&number_, to, sizeof number_);
+    if (is_on_stack && size == sizeof number_ && got == size) std::memcpy(&number_, to, sizeof number_);
     return got;
 }
 
@@ -91,33 +83,27 @@ CheckedBuffer::pos_type CheckedBuffer::seekoff(off_type offset, std::ios_base::s
                                                std::ios_base::openmode which) {
     errno = 0;
     number_ = 0;
-    const pos_type found = checked(FileBuffer::seekoff(offset, from, which));
-    position_ = std::int64_t(std::streamoff(found));
-    return found;
+    return checked(FileBuffer::seekoff(offset, from, which));
 }
 
 CheckedBuffer::pos_type CheckedBuffer::seekpos(pos_type position, std::ios_base::openmode which) {
     errno = 0;
     number_ = 0;
-    const pos_type found = checked(FileBuffer::seekpos(position, which));
-    position_ = std::int64_t(std::streamoff(found));
-    return found;
+    return checked(FileBuffer::seekpos(position, which));
 }
 
-void CheckedBuffer::expect_chunks(std::ios_base& stream, std::int64_t from, std::streamsize least) {
-    stream_ = &stream;
-    from_ = from;
-    least_ = least;
-}
-
-bool CheckedBuffer::is_chunk(std::streamsize size) const {
-    return stream_ != nullptr && number_ == size && position_ >= from_ && size >= least_ &&
+bool CheckedBuffer::has_blosc() const {
+    return stream_ != nullptr &&
            (openvdb::io::getDataCompression(*stream_) & openvdb::io::COMPRESS_BLOSC) != 0;
 }
 
 VdbArchive::VdbArchive(int fd) : buffer_(fd), stream_(&buffer_), stream_metadata_(new openvdb::io::StreamMetadata) {
     file_size_ = size_from_beginning(fd);
+    buffer_.read_below(__builtin_frame_address(0));
+    buffer_.take_compression_of(stream_);
     stream_.exceptions(std::ios::badbit | std::ios::failbit);
+    // Of use to delayed loading alone, and unpacked by Blosc from whatever size its text states: skipped.
+    openvdb::Metadata::unregisterType(openvdb::io::DelayedLoadMetadata::staticTypeName());
     readHeader(stream_);
     openvdb::io::setStreamMetadataPtr(stream_, stream_metadata_, false);
     setFormatVersion(stream_);
@@ -157,10 +143,10 @@ void VdbArchive::read_offsets(std::int32_t count) {
         descriptor.seekToGrid(stream_);
         readGridCompression(stream_);
         header->readMeta(stream_);
+        header->removeMeta(GridBase::META_FILE_DELAYED_LOAD);
         header->readTransform(stream_);
-        const std::int64_t voxels_at = std::int64_t(std::streamoff(stream_.tellg()));
         descriptor.seekToEnd(stream_);
-        entries_.push_back({descriptor, header, voxels_at});
+        entries_.push_back({descriptor, header});
     }
 }
 
@@ -169,28 +155,22 @@ void VdbArchive::read_sequence(std::int32_t count) {
     for (std::int32_t n = 0; n < count; ++n) {
         GridDescriptor descriptor;
         const GridBase::Ptr grid = freed_serially(descriptor.read(stream_));
-        read_voxels(grid, descriptor, 0);
+        readGrid(grid, descriptor, stream_);
         by_name[descriptor.uniqueName()] = grid;
         connectInstance(descriptor, by_name);
-        entries_.push_back({descriptor, grid, 0});
+        entries_.push_back({descriptor, grid});
         sequence_.push_back(grid);
     }
 }
 
-// `voxels_at`: where metadata and transform end, or 0. These have numbers of 8 bytes before texts, whose length takes 4.
-void VdbArchive::read_voxels(const GridBase::Ptr& grid, const GridDescriptor& descriptor, std::int64_t voxels_at) {
-    if (has_chunks_alone(*grid)) buffer_.expect_chunks(stream_, voxels_at, voxels_at > 0 ? 1 : kBloscHead);
-    readGrid(grid, descriptor, stream_);
-    buffer_.expect_no_chunks();
-}
-
 GridBase::Ptr VdbArchive::read(std::size_t n) {
     if (!sequence_.empty()) return sequence_.at(n);
+    buffer_.read_below(__builtin_frame_address(0));
     const GridDescriptor& descriptor = entries_.at(n).descriptor;
     const GridBase::Ptr grid = freed_serially(entries_[n].header->copyGridWithNewTree());
     grid->clearMetadata();
     descriptor.seekToGrid(stream_);
-    read_voxels(grid, descriptor, entries_[n].voxels_at);
+    readGrid(grid, descriptor, stream_);
     if (!descriptor.isInstance()) return grid;
     for (std::size_t parent = 0; parent < entries_.size(); ++parent) {
         const GridDescriptor& candidate = entries_[parent].descriptor;

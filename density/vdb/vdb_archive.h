@@ -20,17 +20,19 @@
 namespace nephos {
 
 // An open file. OpenVDB 10.0.1 (bloscFromStream, unzipFromStream) reads as many bytes as a negative size of a chunk says
-// into a buffer of another size, and compares afterwards: such a read is refused here. So is, where voxels are read, a chunk of
-// Blosc whose head states another size than it has: Blosc reads as much, behind the buffer's end. Reading and seeking that the system
+// into a buffer of another size, and compares afterwards: such a read is refused here. So is a chunk of Blosc whose head states
+// another size than it has: Blosc reads as much, behind the buffer's end. A chunk is what goes to a block of memory behind a
+// number of 8 bytes that went to the stack, its size: numbers of values and metadata go to blocks themselves, and masks
+// behind inactive values to the stack. Reading and seeking that the system
 // refuses throw std::ios_base::failure with its error; a stream alone has a code of its own, the same as for a damaged file.
 class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
   public:
     explicit CheckedBuffer(int fd);  // which it closes
 
-    // Expects chunks of voxels from a position on, of at least so many bytes, where the data compression of `stream` is Blosc's.
-    // What has numbers of 8 bytes beside those of chunks may not be read then: values of such a type, in smaller ones metadata.
-    void expect_chunks(std::ios_base& stream, std::int64_t from, std::streamsize least);
-    void expect_no_chunks() { stream_ = nullptr; }
+    // Says that the functions that read from now on are called by one that has this frame: theirs are on the stack below it.
+    void read_below(const void* frame) { frame_ = frame; }
+    // Takes chunks for Blosc's where this is the data compression of the stream.
+    void take_compression_of(std::ios_base& stream) { stream_ = &stream; }
 
   protected:
     // Throws std::runtime_error where `to` is a block of memory that has no room, or what was read would be read beyond its end.
@@ -39,13 +41,12 @@ class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
     pos_type seekpos(pos_type position, std::ios_base::openmode which) override;
 
   private:
-    bool is_chunk(std::streamsize size) const;
+    bool has_blosc() const;
 
-    std::int64_t number_ = 0;  // of 8 bytes, if that was the last to be read: the size of a chunk
-    std::int64_t position_ = 0;
+    std::int64_t number_ =
+        0;  // of 8 bytes on the stack, if that was the last to be read: the size of a chunk
+    const void* frame_ = nullptr;
     std::ios_base* stream_ = nullptr;
-    std::int64_t from_ = 0;
-    std::streamsize least_ = 0;
 };
 
 class VdbArchive : public openvdb::io::Archive {
@@ -56,7 +57,6 @@ class VdbArchive : public openvdb::io::Archive {
     struct Entry {
         openvdb::io::GridDescriptor descriptor;
         openvdb::GridBase::Ptr header;  // metadata and transform, no voxels
-        std::int64_t voxels_at = 0;     // where these end
     };
     const std::vector<Entry>& entries() const { return entries_; }
     const openvdb::MetaMap& metadata() const { return metadata_; }
@@ -67,8 +67,6 @@ class VdbArchive : public openvdb::io::Archive {
   private:
     void read_offsets(std::int32_t count);
     void read_sequence(std::int32_t count);
-    void read_voxels(const openvdb::GridBase::Ptr& grid, const openvdb::io::GridDescriptor& descriptor,
-                     std::int64_t voxels_at);
     void check_offsets(const openvdb::io::GridDescriptor& descriptor) const;
 
     CheckedBuffer buffer_;

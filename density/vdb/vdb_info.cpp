@@ -134,7 +134,7 @@ void send_info(VdbArchive& archive, SandboxWriter& writer) {
     writer.text(archive.version());
     writer.value(std::uint32_t(archive.entries().size()));
     for (std::size_t n = 0; n < archive.entries().size(); ++n) {
-        const auto& [descriptor, header, voxels_at] = archive.entries()[n];
+        const auto& [descriptor, header] = archive.entries()[n];
         const bool half = descriptor.saveFloatAsHalf();
         const std::string type = header->valueType();
         writer.text(clamp_text(descriptor.gridName()));

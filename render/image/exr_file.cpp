@@ -140,7 +140,7 @@ void write_shadow_part(Imf::MultiPartOutputFile& file, const Picture& picture) {
 void require_complete(const std::filesystem::path& file) {
     Imf::MultiPartInputFile input(file.c_str());
     for (int part = 0; part < input.parts(); ++part)
-        if (!input.partComplete(part)) throw std::runtime_error("incomplete, as for want of memory");
+        if (!input.partComplete(part)) throw std::runtime_error("it is incomplete, as for want of memory");
 }
 
 void check_shape(const Picture& picture) {

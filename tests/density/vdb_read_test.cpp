@@ -544,11 +544,20 @@ TEST(VdbRead, ChunksOfNegativeSizeOverrunNothing) {
     }
 }
 
+// Of floats, or of doubles.
+class VdbChunks : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(OfFloatsAndDoubles, VdbChunks, testing::Bool());
+
 // Blosc reads as many bytes of a chunk as the chunk's own head says, whatever room they have in memory.
-TEST(VdbRead, ChunksOfBloscThatStateAnotherSizeAreDamage) {
+TEST_P(VdbChunks, OfBloscThatStateAnotherSizeAreDamage) {
     const TemporaryFolder folder;
-    auto grid = foreign_fog();
     openvdb::initialize();
+    const auto fog = foreign_fog();
+    openvdb::GridBase::Ptr grid = fog;
+    if (GetParam()) {
+        grid = openvdb::DoubleGrid::create(openvdb::DoubleTree::Ptr(new openvdb::DoubleTree(fog->tree())));
+        grid->setName("density");
+    }
     openvdb::io::File out((folder / "whole.vdb").string());
     out.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
     out.write({grid});
@@ -627,6 +636,41 @@ TEST(VdbRead, InactiveValuesAreNoSizesOfChunks) {
             EXPECT_EQ(read_vdb_info(folder / "ids.vdb").grids.size(), 2u) << value;
             EXPECT_NO_THROW(load_density(folder / "ids.vdb")) << value;
         }
+}
+
+// Tiles whose 8 bytes are all the values of their node, before the mask of the node below, of 64 or 512 bytes.
+TEST(VdbRead, TilesAreNoSizesOfChunks) {
+    const TemporaryFolder folder;
+    openvdb::initialize();
+    const auto is_read = [&](const openvdb::GridBase::Ptr& grid, std::uint32_t compression) {
+        grid->setName("ids");
+        const auto fog = foreign_fog();
+        std::ofstream file(folder / "tile.vdb", std::ios::binary);
+        openvdb::io::Stream out(file);
+        out.setCompression(compression | openvdb::io::COMPRESS_ACTIVE_MASK);
+        out.write(openvdb::GridCPtrVec{grid, fog});
+        file.close();
+        const CoordBBox box = fog->evalActiveVoxelBoundingBox();
+        expect_same_voxels(*fog, read_density(folder / "tile.vdb"),
+                           [&](const Coord& c) { return c - box.min(); });
+    };
+    for (const std::uint32_t compression :
+         {openvdb::io::COMPRESS_NONE, openvdb::io::COMPRESS_ZIP, openvdb::io::COMPRESS_BLOSC})
+        for (const auto& [level, place, size] :
+             {std::tuple(1, Coord(0, 0, 8), 64), std::tuple(2, Coord(0, 0, 128), 512)})
+            for (const int sign : {-1, 1}) {
+                for (const std::int64_t background : {std::int64_t(0), std::int64_t(1) << 62}) {
+                    auto ids = openvdb::Int64Grid::create(background);
+                    ids->tree().addTile(level, place, sign * size, true);
+                    ids->tree().setValueOn(Coord(1, 0, 0), 5);
+                    is_read(ids, compression);
+                }
+                auto pairs = openvdb::Int32Grid::create(0);
+                pairs->tree().addTile(level, place, sign * size, true);
+                pairs->tree().addTile(level, Coord(2 * place.z(), 0, 0), sign < 0 ? -1 : 0, true);
+                pairs->tree().setValueOn(Coord(1, 0, 0), 5);
+                is_read(pairs, compression);
+            }
 }
 
 TEST(VdbRead, InfoListsEveryGrid) {

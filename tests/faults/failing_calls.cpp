@@ -5,7 +5,8 @@
 //                                       from FIRST on. NAME: open, read, write (with pwrite, writev), lseek, fsync (with
 //                                       fdatasync), rename (with renameat, renameat2), mkdir, stat (with lstat, fstat, fstatat), mmap, or
 //                                       allocate (memory of 32 KiB or more). HOW: an error (EIO, EINTR, ENOSPC, EACCES,
-//                                       EMFILE, ENOMEM, EXDEV, EINVAL), KILL, STOP (until SIGCONT; the call does not fail), SHORT (of read
+//                                       EMFILE, ENOMEM, EXDEV, EINVAL), KILL, STOP (until SIGCONT; the call does not fail), HOLD (the call never ends; a byte goes into
+//                                       the file FAIL_COUNT), SHORT (of read
 //                                       and write: half of the bytes), or COUNT (a byte into the file FAIL_COUNT for each)
 //     FAIL_PATH=TEXT                    only on files in whose path TEXT occurs
 //     FAIL_PROGRAM=NAME                 only in this program
@@ -89,6 +90,10 @@ bool fails(const char* name, std::string_view path, bool* shorten = nullptr) {
     const long number = ++calls;
     if (number < p.first || number >= p.first + p.count) return false;
     if (is("KILL")) ::raise(SIGKILL);
+    if (is("HOLD")) {
+        count_call();
+        for (;;) ::pause();
+    }
     if (is("STOP")) {
         ::raise(SIGSTOP);
         return false;
