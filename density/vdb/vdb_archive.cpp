@@ -102,7 +102,7 @@ VdbArchive::VdbArchive(int fd) : buffer_(fd), stream_(&buffer_), stream_metadata
     buffer_.read_below(__builtin_frame_address(0));
     buffer_.take_compression_of(stream_);
     stream_.exceptions(std::ios::badbit | std::ios::failbit);
-    // Of use to delayed loading alone, and unpacked by Blosc from whatever size its text states: skipped.
+    // Skips what is of use to delayed loading alone, and which Blosc unpacks from whatever size its text states.
     openvdb::Metadata::unregisterType(openvdb::io::DelayedLoadMetadata::staticTypeName());
     readHeader(stream_);
     openvdb::io::setStreamMetadataPtr(stream_, stream_metadata_, false);

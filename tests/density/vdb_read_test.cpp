@@ -544,7 +544,7 @@ TEST(VdbRead, ChunksOfNegativeSizeOverrunNothing) {
     }
 }
 
-// Of floats, or of doubles.
+// Says whether voxels are doubles.
 class VdbChunks : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(OfFloatsAndDoubles, VdbChunks, testing::Bool());
 

@@ -268,7 +268,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
         openvdb::initialize();
         std::cerr.setstate(
             std::ios::badbit);  // where OpenVDB warns of each file; the confined process has none
-        // What libraries keep from their first use on is taken before memory is watched.
+        // Takes what libraries keep from their first use on, before memory is watched.
         const auto grid = openvdb::FloatGrid::create();
         grid->setName("density");
         grid->tree().setValue(openvdb::Coord(0, 0, 0), 1.0f);
