@@ -10,7 +10,7 @@
 
 namespace nephos {
 
-// What a page has beside the description, the options and the footer of a parser.
+// Holds what a page has beside the description, the options and the footer of a parser.
 struct ManPageTexts {
     std::string name;         // of the page: "nephos-run"
     std::string usage;        // one line

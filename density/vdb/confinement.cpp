@@ -42,8 +42,9 @@ std::size_t sum_or_most(std::size_t a, std::size_t b) {
 // Opens a file of this process in /proc, which a bare chroot or container may be without.
 std::ifstream open_own(const std::string& name) {
     std::ifstream file("/proc/self/" + name);
+    const int number = errno;
     if (!file)
-        fail((errno == ENOENT ? "it takes a mounted /proc: /proc/self/" : "/proc/self/") + name, errno);
+        fail((number == ENOENT ? "it takes a mounted /proc: /proc/self/" : "/proc/self/") + name, number);
     return file;
 }
 

@@ -2,6 +2,7 @@
 #include "density/vdb/vdb_archive.h"
 
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <stdexcept>

@@ -43,8 +43,7 @@ class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
   private:
     bool has_blosc() const;
 
-    std::int64_t number_ =
-        0;  // of 8 bytes on the stack, if that was the last to be read: the size of a chunk
+    std::int64_t number_ = 0;  // of 8 bytes on the stack, if it was read last: the size of a chunk
     const void* frame_ = nullptr;
     std::ios_base* stream_ = nullptr;
 };

@@ -16,6 +16,7 @@
 
 #include "density/export/nanovdb_file.h"
 #include "density/export/nanovdb_stream.h"
+#include "tests/fuzz/sent.h"
 #include "tests/fuzz/target.h"
 
 namespace {
@@ -133,33 +134,12 @@ std::string packed(const std::string& bytes, const Original& original) {
     return file;
 }
 
-// Reads what the child has sent, as the parent does.
-class Sent : public SandboxReader {
-  public:
-    explicit Sent(std::string bytes) : bytes_(std::move(bytes)) {}
-    void bytes(void* data, std::size_t size) override {
-        fuzz::require(size <= bytes_.size() - at_, "what is sent is whole");
-        bytes_.copy(static_cast<char*>(data), size, at_);
-        at_ += size;
-    }
-
-  private:
-    std::string bytes_;
-    std::size_t at_ = 0;
-};
-
 std::string sent_of(const fuzz::InputFile& file) {
     fuzz::InputFile sent({});
     SandboxWriter writer(sent.descriptor());
     send_nanovdb(file.descriptor(), kExtent, writer);
     writer.flush();
-    std::ifstream stream(sent.path(), std::ios::binary);
-    std::string bytes;
-    for (std::uint32_t chunk = 0; stream.read(reinterpret_cast<char*>(&chunk), sizeof chunk);) {
-        bytes.resize(bytes.size() + chunk);
-        stream.read(bytes.data() + bytes.size() - chunk, chunk);
-    }
-    return bytes;
+    return fuzz::sent_to(sent);
 }
 
 }  // namespace
@@ -176,7 +156,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (original.is_packed) bytes = packed(bytes, original);
     const fuzz::InputFile file(bytes);
     try {
-        Sent sent(sent_of(file));
+        fuzz::Sent sent(sent_of(file));
         fuzz::accepts([&] { receive_nanovdb(sent, kExtent); });
     } catch (const std::exception& error) {
         // Documented in nanovdb_stream.h; read_nanovdb() makes an Error of it.

@@ -32,6 +32,7 @@
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_sandbox.h"
 #include "density/voxel_digest.h"
+#include "tests/fuzz/sent.h"
 #include "tests/fuzz/target.h"
 #include "tests/fuzz/watched_memory.h"
 
@@ -200,31 +201,6 @@ std::string text_of(const Lattice& state) {
     return text;
 }
 
-// Hands the parent what the child has sent.
-class Sent : public SandboxReader {
-  public:
-    explicit Sent(std::string_view left) : left_(left) {}
-    void bytes(void* data, std::size_t size) override {
-        fuzz::require(size <= left_.size(), "what is sent is whole");
-        left_.copy(static_cast<char*>(data), size);
-        left_.remove_prefix(size);
-    }
-    bool is_over() const { return left_.empty(); }
-
-  private:
-    std::string_view left_;
-};
-
-std::string sent_to(const fuzz::InputFile& pipe) {
-    std::ifstream stream(pipe.path(), std::ios::binary);
-    std::string bytes;
-    for (std::uint32_t chunk = 0; stream.read(reinterpret_cast<char*>(&chunk), sizeof chunk);) {
-        bytes.resize(bytes.size() + chunk);
-        stream.read(bytes.data() + bytes.size() - chunk, chunk);
-    }
-    return bytes;
-}
-
 }  // namespace
 
 // Takes the place of that of density/vdb/vdb_sandbox.cpp, which forks: the linker needs nothing else of it.
@@ -241,8 +217,7 @@ void in_sandbox(const std::filesystem::path& path, const VdbReadLimits&,
         fuzz::require(error.what()[0] != '\0', "an error has a message");
         throw Error(ErrorCode::io, error.what());
     }
-    const std::string bytes = sent_to(pipe);
-    Sent sent(bytes);
+    fuzz::Sent sent(fuzz::sent_to(pipe));
     try {
         parent(sent);
     } catch (const std::runtime_error& error) {  // as run_sandboxed() does

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kNode = 2048;  // the voxels of a leaf, and all nodes above one
 
-// Of the table of blocks, which may not call operator new.
+// Allocates for the table of blocks, which may not call operator new.
 template <class T>
 struct FromMalloc {
     using value_type = T;
@@ -108,7 +108,7 @@ void given_back(void* at) {
 }  // namespace
 }  // namespace nephos::fuzz
 
-// What OpenVDB loses when it throws is no leak of ours.
+// Looks for no leaks: what OpenVDB loses when it throws is none of ours.
 extern "C" const char* __asan_default_options() { return "detect_leaks=0"; }
 
 // Replaces those of the standard library, and with them the forms for arrays and those that do not throw.
