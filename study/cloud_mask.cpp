@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "statistics/clouds.h"
 #include "study/cloud_mask_axes.h"
@@ -147,6 +150,35 @@ CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions
     return masks;
 }
 
+// Returns whether a PNG, by its head, is interlaced and has 16 bits and no alpha. libpng 1.6.39 of Debian 12 with its later corrections
+// mixes passes when it cuts such pixels to 8 bits (its issue 853).
+bool is_deep_and_interlaced(std::string_view png) {
+    constexpr std::size_t kDepth = 24, kColour = 25, kInterlace = 28;
+    return png.size() > kInterlace && png[kDepth] == 16 && png[kInterlace] != 0 &&
+           (png[kColour] & PNG_COLOR_MASK_ALPHA) == 0;
+}
+
+// Returns the grey, of 255, of linear light of 65,535, by the curve of IEC 61966-2-1.
+png_byte grey_of_light(png_uint_16 light) {
+    const double linear = light / 65535.0;
+    const double grey = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+    return png_byte(std::lround(255 * grey));
+}
+
+// Decodes what was begun to a byte of grey a pixel; false where libpng fails.
+bool read_grey(png_image& image, std::string_view png, std::vector<png_byte>& pixels) {
+    if (!is_deep_and_interlaced(png)) {
+        image.format = PNG_FORMAT_GRAY;
+        return png_image_finish_read(&image, nullptr, pixels.data(), png_int_32(image.width), nullptr) != 0;
+    }
+    image.format = PNG_FORMAT_LINEAR_Y;
+    std::vector<png_uint_16> light(pixels.size());
+    if (png_image_finish_read(&image, nullptr, light.data(), png_int_32(image.width), nullptr) == 0)
+        return false;
+    std::ranges::transform(light, pixels.begin(), grey_of_light);
+    return true;
+}
+
 CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& options) {
     if (!options.variable.empty()) fail(ErrorCode::usage, path, "a picture has no variables");
     const double size = cell_size(path, options);
@@ -166,7 +198,6 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
     image.version = PNG_IMAGE_VERSION;
     if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
         fail(ErrorCode::io, path, image.message);
-    image.format = PNG_FORMAT_GRAY;
     image.flags |=
         PNG_IMAGE_FLAG_16BIT_sRGB;  // else 16 bits are taken for linear light, and 20,000 of 65,535 for 149 of 255
     const std::uint64_t pixels_claimed = std::uint64_t(image.width) * image.height;
@@ -185,8 +216,7 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
     }
     const Extent extent{int(image.width), int(image.height), 1};
     std::vector<png_byte> pixels(extent.cells());
-    if (png_image_finish_read(&image, nullptr, pixels.data(), png_int_32(image.width), nullptr) == 0)
-        fail(ErrorCode::io, path, image.message);
+    if (!read_grey(image, bytes, pixels)) fail(ErrorCode::io, path, image.message);
     CloudMasks masks{{}, size, size, {0}, options.boundaries, true, 0, {}};
     masks.snapshots.push_back(plane_of(
         extent, options.threshold.value_or(kGreyThreshold),

@@ -11,9 +11,11 @@
 #include <system_error>
 
 #include <malloc.h>
+#include <openvdb/io/Compression.h>
 #include <openvdb/io/DelayedLoadMetadata.h>
 #include <unistd.h>
 
+#include "density/vdb/sanitized.h"
 #include "density/vdb/serial_tree.h"
 
 namespace nephos {
@@ -52,6 +54,14 @@ void check_blosc(std::string_view chunk) {
                                  " bytes states another size");
 }
 
+// Returns how many inactive values follow the byte with which the values of a node begin.
+int inactive_values(char node) {
+    if (node == openvdb::io::MASK_AND_TWO_INACTIVE_VALS) return 2;
+    return node == openvdb::io::NO_MASK_AND_ONE_INACTIVE_VAL || node == openvdb::io::MASK_AND_ONE_INACTIVE_VAL
+               ? 1
+               : 0;
+}
+
 // Returns whether memory lies on the stack between two frames.
 bool is_between(const void* last_frame, const void* memory, const void* first_frame) {
     const auto place = [](const void* at) { return reinterpret_cast<std::uintptr_t>(at); };
@@ -67,8 +77,8 @@ CheckedBuffer::CheckedBuffer(int fd) : FileBuffer(fd, std::ios::in | std::ios::b
 std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
     const bool is_on_stack = is_between(__builtin_frame_address(0), to, frame_);
     // Where such a size precedes, OpenVDB passes the beginning of the block that it has allocated for the voxels. All
-    // blocks have room for 24 bytes.
-    constexpr std::streamsize kLeastBlock = 24;
+    // blocks of glibc have room for 24 bytes.
+    constexpr std::streamsize kLeastBlock = NEPHOS_SANITIZED ? 0 : 24;
     const bool is_negated =
         number_ < 0 && number_ != std::numeric_limits<std::int64_t>::min() && size == -number_;
     if (!is_on_stack && is_negated && size > kLeastBlock && ::malloc_usable_size(to) < std::size_t(size))
@@ -76,20 +86,36 @@ std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
     const std::streamsize got = FileBuffer::xsgetn(to, size);
     if (!is_on_stack && number_ == size && got == size && has_blosc()) check_blosc({to, std::size_t(size)});
     number_ = 0;
-    if (is_on_stack && size == sizeof number_ && got == size) std::memcpy(&number_, to, sizeof number_);
+    if (is_on_stack && got == size) note_on_stack(to, size);
     return got;
+}
+
+void CheckedBuffer::note_on_stack(const char* bytes, std::streamsize size) {
+    if (inactive_values_ > 0) {
+        --inactive_values_;
+    } else if (size == 1) {
+        const bool has_them = stream_ != nullptr && openvdb::io::getFormatVersion(*stream_) >=
+                                                        openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
+        inactive_values_ = has_them ? inactive_values(*bytes) : 0;
+    } else if (size == sizeof number_) {
+        std::memcpy(&number_, bytes, sizeof number_);
+    }
+}
+
+void CheckedBuffer::forget_last() {
+    errno = 0;
+    number_ = 0;
+    inactive_values_ = 0;
 }
 
 CheckedBuffer::pos_type CheckedBuffer::seekoff(off_type offset, std::ios_base::seekdir from,
                                                std::ios_base::openmode which) {
-    errno = 0;
-    number_ = 0;
+    forget_last();
     return checked(FileBuffer::seekoff(offset, from, which));
 }
 
 CheckedBuffer::pos_type CheckedBuffer::seekpos(pos_type position, std::ios_base::openmode which) {
-    errno = 0;
-    number_ = 0;
+    forget_last();
     return checked(FileBuffer::seekpos(position, which));
 }
 
@@ -101,12 +127,17 @@ bool CheckedBuffer::has_blosc() const {
 VdbArchive::VdbArchive(int fd) : buffer_(fd), stream_(&buffer_), stream_metadata_(new openvdb::io::StreamMetadata) {
     file_size_ = size_from_beginning(fd);
     buffer_.read_below(__builtin_frame_address(0));
-    buffer_.take_compression_of(stream_);
+    buffer_.take_format_of(stream_);
     stream_.exceptions(std::ios::badbit | std::ios::failbit);
     // Skips what is of use to delayed loading alone, and which Blosc unpacks from whatever size its text states.
     openvdb::Metadata::unregisterType(openvdb::io::DelayedLoadMetadata::staticTypeName());
     readHeader(stream_);
     openvdb::io::setStreamMetadataPtr(stream_, stream_metadata_, false);
+    // Before it, tiles of 8 bytes stand before masks one by one, and would be taken for sizes of chunks.
+    constexpr std::uint32_t kOldest = openvdb::OPENVDB_FILE_VERSION_INTERNALNODE_COMPRESSION;
+    if (fileVersion() < kOldest)
+        throw std::runtime_error("its format has version " + std::to_string(fileVersion()) +
+                                 "; expected at least " + std::to_string(kOldest));
     setFormatVersion(stream_);
     setLibraryVersion(stream_);
     setDataCompression(stream_);

@@ -22,17 +22,17 @@ namespace nephos {
 // An open file. OpenVDB 10.0.1 (bloscFromStream, unzipFromStream) reads as many bytes as a negative size of a chunk says
 // into a buffer of another size, and compares afterwards: such a read is refused here. So is a chunk of Blosc whose head states
 // another size than it has: Blosc reads as much, behind the buffer's end. A chunk is what goes to a block of memory behind a
-// number of 8 bytes that went to the stack, its size: numbers of values and metadata go to blocks themselves, and masks
-// behind inactive values to the stack. Reading and seeking that the system
-// refuses throw std::ios_base::failure with its error; a stream alone has a code of its own, the same as for a damaged file.
+// number of 8 bytes that went to the stack, its size: numbers of values and metadata go to blocks themselves. Inactive values of
+// nodes, which go to the stack, too, are told by the byte before them, which says how many there are. What comes of grids of
+// points is not checked: their chunks have sizes of 2 and 4 bytes. Reading and seeking that the system refuses throw std::ios_base::failure with its error; a stream alone has a code of its own, the same as for a damaged file.
 class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
   public:
     explicit CheckedBuffer(int fd);  // which it closes
 
     // Says that the functions that read from now on are called by one that has this frame: theirs are on the stack below it.
     void read_below(const void* frame) { frame_ = frame; }
-    // Takes chunks for Blosc's where this is the data compression of the stream.
-    void take_compression_of(std::ios_base& stream) { stream_ = &stream; }
+    // Takes chunks for Blosc's where this is the data compression of the stream, and nodes for those of its format.
+    void take_format_of(std::ios_base& stream) { stream_ = &stream; }
 
   protected:
     // Throws std::runtime_error where `to` is a block of memory that has no room, or what was read would be read beyond its end.
@@ -42,8 +42,11 @@ class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
 
   private:
     bool has_blosc() const;
+    void note_on_stack(const char* bytes, std::streamsize size);
+    void forget_last();
 
     std::int64_t number_ = 0;  // of 8 bytes on the stack, if it was read last: the size of a chunk
+    int inactive_values_ = 0;  // that a node has and that have not been read yet
     const void* frame_ = nullptr;
     std::ios_base* stream_ = nullptr;
 };

@@ -26,6 +26,7 @@ PngInput::PngInput(const std::filesystem::path& path, png_uint_32 most) : path_(
         fail("it has " + std::to_string(size) + " bytes; expected at most " + std::to_string(kMostBytes));
     file_ = read_beginning(path, std::size_t(size));
     if (png_image_begin_read_from_memory(&image_, file_.data(), file_.size()) == 0) fail(image_.message);
+    image_.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;  // else 16 bits that do not say so are taken for linear light
     const std::string claim =
         std::to_string(image_.width) + " x " + std::to_string(image_.height) + " pixels";
     std::string reason;

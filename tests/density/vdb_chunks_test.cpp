@@ -169,6 +169,52 @@ TEST(VdbRead, InactiveValuesAreNoSizesOfChunks) {
         }
 }
 
+// Inactive values of 8 bytes, all that their nodes store, before the mask of the node below. OpenVDB writes no such bits itself.
+TEST(VdbRead, InactiveValuesOfHalvedDoublesAreNoSizesOfChunks) {
+    const TemporaryFolder folder;
+    openvdb::initialize();
+    constexpr double kInactive = 5;
+    for (const std::uint32_t compression : {openvdb::io::COMPRESS_ZIP, openvdb::io::COMPRESS_BLOSC})
+        for (const int sign : {-1, 1}) {
+            auto halves = openvdb::DoubleGrid::create(0);
+            halves->setSaveFloatAsHalf(true);
+            halves->tree().addTile(3, Coord(0), kInactive, false);
+            halves->tree().setValueOn(Coord(1, 0, 0), 0.5);
+            std::ofstream file(folder / "halves.vdb", std::ios::binary);
+            openvdb::io::Stream out(file);
+            out.setCompression(compression | openvdb::io::COMPRESS_ACTIVE_MASK);
+            out.write(openvdb::GridCPtrVec{halves});
+            file.close();
+            std::vector<char> bytes = test::bytes_of(folder / "halves.vdb");
+            std::vector<std::int64_t> sizes{64, 512};  // of the masks below nodes of level 1 and 2
+            for (std::size_t at = 0; at + sizeof kInactive < bytes.size() && !sizes.empty(); ++at) {
+                if (std::memcmp(&bytes[at], &kInactive, sizeof kInactive) != 0) continue;
+                const std::int64_t number = sign * sizes.back();
+                std::memcpy(&bytes[at], &number, sizeof number);
+                sizes.pop_back();
+            }
+            ASSERT_TRUE(sizes.empty());
+            test::write_bytes(folder / "halves.vdb", bytes);
+            EXPECT_EQ(read_vdb_info(folder / "halves.vdb").grids.size(), 1u) << sign;
+        }
+}
+
+TEST(VdbRead, FormatsOfAnotherAgeAreRefused) {
+    const TemporaryFolder folder;
+    openvdb::initialize();
+    openvdb::io::File out((folder / "old.vdb").string());
+    out.write({foreign_fog()});
+    out.close();
+    std::vector<char> bytes = test::bytes_of(folder / "old.vdb");
+    constexpr std::size_t kVersion = 8;
+    const std::uint32_t version = 213;
+    std::memcpy(&bytes[kVersion], &version, sizeof version);
+    test::write_bytes(folder / "old.vdb", bytes);
+    EXPECT_NE(error_of(folder / "old.vdb").find("its format has version 213; expected at least 214"),
+              std::string::npos)
+        << error_of(folder / "old.vdb");
+}
+
 // Tiles whose 8 bytes are all the values of their node, before the mask of the node below, of 64 or 512 bytes.
 TEST(VdbRead, TilesAreNoSizesOfChunks) {
     const TemporaryFolder folder;

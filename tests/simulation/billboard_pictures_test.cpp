@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -13,6 +15,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <png.h>
 #include <sys/stat.h>
 
 #include "core/error.h"
@@ -57,6 +60,36 @@ TEST(AlphaImages, AreReadWithTheirOpacity) {
     EXPECT_EQ(image.opacity[at(128, 250)], 0);  // below the heap's flat base: row 0 is at the top
     EXPECT_GT(image.opacity[at(128, 170)], 0.9f);
     for (std::size_t n = 0; n < image.opacity.size(); ++n) ASSERT_LE(image.bright[n], image.opacity[n]);
+}
+
+// Writes one opaque pixel of grey, of 255, with 8 or 16 bits and no word on how light is coded.
+void write_opaque_pixel(const fs::path& path, int depth, int grey) {
+    std::FILE* file = std::fopen(path.c_str(), "wb");
+    ASSERT_NE(file, nullptr);
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+    png_infop info = png_create_info_struct(png);
+    png_init_io(png, file);
+    png_set_IHDR(png, info, 1, 1, depth, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_write_info(png, info);
+    const png_byte byte = png_byte(grey);
+    const png_byte deep[] = {byte, byte, 255, 255}, shallow[] = {byte, 255};
+    png_write_row(png, depth == 16 ? deep : shallow);
+    png_write_end(png, info);
+    png_destroy_write_struct(&png, &info);
+    std::fclose(file);
+}
+
+TEST(AlphaImages, LuminanceIsAsShownWhateverTheDepth) {
+    const TemporaryFolder folder;
+    for (const int grey : {10, 100, 200}) {
+        write_opaque_pixel(folder.path() / "8.png", 8, grey);
+        write_opaque_pixel(folder.path() / "16.png", 16, grey);
+        const AlphaImage shallow = read_alpha_image(folder.path() / "8.png"),
+                         deep = read_alpha_image(folder.path() / "16.png");
+        EXPECT_LT(shallow.bright.at(0), float(grey) / 255) << grey;
+        EXPECT_NEAR(deep.bright.at(0), shallow.bright.at(0), 0.5 / 255) << grey;  // 8 bits stay 8 as light
+    }
 }
 
 TEST(AlphaImages, OthersAreRefusedByName) {
