@@ -238,7 +238,8 @@ void print_warnings(const Scene& scene) {
 
 void limit_threads(int threads) {
     if (threads <= 0) return;
-    [[maybe_unused]] static const tbb::global_control* limit = nullptr;  // never deleted
+    // Never deleted; volatile, else the compiler leaves the pointer out, and the sanitizer finds a leak.
+    [[maybe_unused]] static const tbb::global_control* volatile limit = nullptr;
     limit = new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
 }
 
