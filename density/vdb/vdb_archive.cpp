@@ -42,11 +42,12 @@ std::int64_t size_from_beginning(int fd) {
     return std::int64_t(size);
 }
 
-// Throws std::runtime_error where a chunk of Blosc states another size than it has. That takes no version but its own.
+// Throws std::runtime_error where a chunk of Blosc has no whole head, which it reads before it looks at the version, or states another
+// size than it has. That takes no version but its own.
 void check_blosc(std::string_view chunk) {
     constexpr std::size_t kHead = 16, kSize = 12;
     constexpr char kVersion = 2;
-    if (chunk.empty() || chunk[0] != kVersion) return;
+    if (chunk.empty() || (chunk.size() >= kHead && chunk[0] != kVersion)) return;
     std::uint32_t size = 0;
     if (chunk.size() >= kHead) std::memcpy(&size, chunk.data() + kSize, sizeof size);
     if (size != chunk.size())
@@ -133,8 +134,9 @@ VdbArchive::VdbArchive(int fd) : buffer_(fd), stream_(&buffer_), stream_metadata
     openvdb::Metadata::unregisterType(openvdb::io::DelayedLoadMetadata::staticTypeName());
     readHeader(stream_);
     openvdb::io::setStreamMetadataPtr(stream_, stream_metadata_, false);
-    // Before it, tiles of 8 bytes stand before masks one by one, and would be taken for sizes of chunks.
-    constexpr std::uint32_t kOldest = openvdb::OPENVDB_FILE_VERSION_INTERNALNODE_COMPRESSION;
+    // Before it, transforms stand behind the topology; two versions earlier tiles of 8 bytes stand before masks one by one, and would
+    // be taken for sizes of chunks.
+    constexpr std::uint32_t kOldest = openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING;
     if (fileVersion() < kOldest)
         throw std::runtime_error("its format has version " + std::to_string(fileVersion()) +
                                  "; expected at least " + std::to_string(kOldest));

@@ -225,6 +225,17 @@ class Permuter {
     Sanitiser sanitise_;
 };
 
+// Gives BoxSampler the values as a fog volume has them: inactive ones 0.
+struct ActiveValues {
+    using ValueType = float;
+    FloatGrid::ConstUnsafeAccessor voxels;
+
+    float getValue(const Coord& c) const {
+        float value = 0;
+        return voxels.probeValue(c, value) ? value : 0.0f;
+    }
+};
+
 // Trilinear samples on cubes whose edge is the file's shortest voxel edge.
 class Skewed {
   public:
@@ -241,7 +252,7 @@ class Skewed {
 
     ForeignResult run(const DensityReceiver& receiver) {
         receiver.begin(extent_, {{low_.x(), low_.y(), low_.z()}, edge_});
-        const auto accessor = foreign_.grid->getConstUnsafeAccessor();
+        const ActiveValues values_in_file{foreign_.grid->getConstUnsafeAccessor()};
         Sanitiser sanitise;
         for (const Coord& origin : blocks()) {
             float values[kBlockVoxels] = {};
@@ -251,7 +262,7 @@ class Skewed {
                 if (voxel.x() >= extent_.x || voxel.y() >= extent_.y || voxel.z() >= extent_.z) continue;
                 const Vec3d world = low_ + (voxel.asVec3d() + Vec3d(0.5)) * edge_;
                 const Vec3d index = foreign_.grid->transform().worldToIndex(to_file(world));
-                values[n] = sanitise(openvdb::tools::BoxSampler::sample(accessor, index));
+                values[n] = sanitise(openvdb::tools::BoxSampler::sample(values_in_file, index));
                 any = any || values[n] > 0;
             }
             if (any) receiver.leaf(origin, values);

@@ -154,6 +154,32 @@ TEST(VdbRead, PermutedTransformsArePermuted) {
     }
 }
 
+// As in cubes, where they are 0, too: a program may take voxels out of a cloud without setting their values.
+TEST(VdbRead, InactiveVoxelsAddNothingWhereVoxelsAreResampled) {
+    const TemporaryFolder folder;
+    std::vector<float> first;
+    for (const float inactive : {0.0f, 100.0f, std::numeric_limits<float>::quiet_NaN()}) {
+        auto grid = FloatGrid::create(0.0f);
+        grid->setName("density");
+        grid->setTransform(openvdb::math::Transform::createLinearTransform(1.0));
+        grid->transform().preScale(openvdb::Vec3d(1, 1, 2));
+        for (auto c = CoordBBox(Coord(0), Coord(7)).begin(); c; ++c) {
+            if (((*c).x() + (*c).y()) % 2 == 0)
+                grid->tree().setValueOn(*c, 0.5f);
+            else
+                grid->tree().setValueOff(*c, inactive);
+        }
+        write_with_openvdb(folder / "flat.vdb", {grid});
+        const DensityGrid found = load_density(folder / "flat.vdb").density;
+        std::vector<float> values;
+        for (auto c = CoordBBox(Coord(0), Coord(7)).begin(); c; ++c)
+            values.push_back(found.value((*c).x(), (*c).y(), (*c).z()));
+        if (first.empty()) first = values;
+        EXPECT_EQ(values, first) << inactive;
+        EXPECT_EQ(*std::ranges::max_element(values), 0.5f) << inactive;
+    }
+}
+
 // A field that is linear in space survives trilinear resampling: rotated, and with voxels that are no cubes.
 TEST(VdbRead, SkewedVoxelsAreResampled) {
     const TemporaryFolder folder;
