@@ -198,7 +198,7 @@ TEST(Determinism, ThreadsDoNotChangeTheBits) {
     }
 }
 
-#if HWY_ARCH_X86 && !defined(__SSSE3__)
+#if HWY_ARCH_X86 && !defined(__SSSE3__) && HWY_DISABLED_TARGETS == 0
 // A build for any x86-64 processor has kernels for those without AVX2, too.
 TEST(Determinism, KernelsHaveTheTargetsBelowAvx2) {
     constexpr std::int64_t kBelow = HWY_SSSE3 | HWY_SSE4;
