@@ -42,8 +42,8 @@ std::int64_t size_from_beginning(int fd) {
     return std::int64_t(size);
 }
 
-// Throws std::runtime_error where a chunk of Blosc has no whole head, which it reads before it looks at the version, or states another
-// size than it has. That takes no version but its own.
+// Throws std::runtime_error where a chunk of Blosc has no whole head, which Blosc reads before it looks at the version, or
+// states another size than it has. Blosc takes no version but its own.
 void check_blosc(std::string_view chunk) {
     constexpr std::size_t kHead = 16, kSize = 12;
     constexpr char kVersion = 2;

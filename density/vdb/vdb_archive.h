@@ -23,8 +23,9 @@ namespace nephos {
 // into a buffer of another size, and compares afterwards: such a read is refused here. So is a chunk of Blosc whose head states
 // another size than it has: Blosc reads as much, behind the buffer's end. A chunk is what goes to a block of memory behind a
 // number of 8 bytes that went to the stack, its size: numbers of values and metadata go to blocks themselves. Inactive values of
-// nodes, which go to the stack, too, are told by the byte before them, which says how many there are. What comes of grids of
-// points is not checked: their chunks have sizes of 2 and 4 bytes. Reading and seeking that the system refuses throw std::ios_base::failure with its error; a stream alone has a code of its own, the same as for a damaged file.
+// nodes, which go to the stack, too, are told by the byte before them, which says how many there are. Grids of
+// points are not checked: their chunks have sizes of 2 and 4 bytes. Reading and seeking that the system refuses throw
+// std::ios_base::failure with its error; a stream alone has a code of its own, the same as for a damaged file.
 class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
   public:
     explicit CheckedBuffer(int fd);  // which it closes

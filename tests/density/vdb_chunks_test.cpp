@@ -62,7 +62,7 @@ TEST(VdbRead, ChunksOfNegativeSizeOverrunNothing) {
                     load_density(folder / "negative.vdb");
                     ADD_FAILURE() << "chunk at byte " << at << " read as " << more;
                 } catch (const Error& error) {
-                    // Where the file has no more bytes than there is room for, OpenVDB says so itself.
+                    // OpenVDB says so itself where the file has no more bytes than there is room for.
                     const bool fits = more <= 512 * std::int64_t(sizeof(float));
                     EXPECT_NE(
                         std::string(error.what()).find(fits ? "Expected to read" : "where fewer belong"),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a confined process sends its parent, for targets that call both sides in one process: a SandboxWriter fills a file in
+// Reads what a confined process sends its parent, for targets that call both sides in one process: a SandboxWriter fills a file in
 // memory, and a SandboxReader hands its bytes over.
 
 #include <cstddef>
