@@ -13,10 +13,9 @@
 #include "study/netcdf_file.h"
 #include "study/snapshot.h"
 #include <fmt/format.h>
-#include <png.h>
 
-#include "core/descriptor.h"
 #include "core/error.h"
+#include "core/png/png_input.h"
 #include "density/vdb/mask_file.h"
 #include "scenes/format/text.h"
 #include "simulation/memory.h"
@@ -80,7 +79,9 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
                          kMostColumns));
     require_memory(BitPlane::bytes(extent), fmt::format("{}: the mask of {} x {} x {} voxels around its grid",
                                                         path.string(), extent.x, extent.y, extent.z));
-    CloudMasks masks{{}, size, size, {grid.placement().origin_m.z}, options.boundaries, false, 0, {}};
+    CloudMasks masks{
+        {}, size, loaded.level_height_m, {grid.placement().origin_m.z}, options.boundaries, false, 0, {}};
+    masks.notes = loaded.notes;
     const double threshold = options.threshold.value_or(0);
     BitPlane& plane = masks.snapshots.emplace_back(extent);
     if (threshold < 0 && loaded.negative > 0)
@@ -150,77 +151,17 @@ CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions
     return masks;
 }
 
-// Returns whether a PNG, by its head, is interlaced and has 16 bits and no alpha. libpng 1.6.39 of Debian 12 with its later corrections
-// mixes passes when it cuts such pixels to 8 bits (its issue 853).
-bool is_deep_and_interlaced(std::string_view png) {
-    constexpr std::size_t kDepth = 24, kColour = 25, kInterlace = 28;
-    return png.size() > kInterlace && png[kDepth] == 16 && png[kInterlace] != 0 &&
-           (png[kColour] & PNG_COLOR_MASK_ALPHA) == 0;
-}
-
-// Returns the grey, of 255, of linear light of 65,535, by the curve of IEC 61966-2-1.
-png_byte grey_of_light(png_uint_16 light) {
-    const double linear = light / 65535.0;
-    const double grey = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-    return png_byte(std::lround(255 * grey));
-}
-
-// Decodes what was begun to a byte of grey a pixel; false where libpng fails.
-bool read_grey(png_image& image, std::string_view png, std::vector<png_byte>& pixels) {
-    if (!is_deep_and_interlaced(png)) {
-        image.format = PNG_FORMAT_GRAY;
-        return png_image_finish_read(&image, nullptr, pixels.data(), png_int_32(image.width), nullptr) != 0;
-    }
-    image.format = PNG_FORMAT_LINEAR_Y;
-    std::vector<png_uint_16> light(pixels.size());
-    if (png_image_finish_read(&image, nullptr, light.data(), png_int_32(image.width), nullptr) == 0)
-        return false;
-    std::ranges::transform(light, pixels.begin(), grey_of_light);
-    return true;
-}
-
 CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& options) {
     if (!options.variable.empty()) fail(ErrorCode::usage, path, "a picture has no variables");
     const double size = cell_size(path, options);
     require_no_height(path, options);
-    // Deflate makes at most 1,032 bytes of one, and a pixel has at least a bit: a header that claims more lies.
-    constexpr std::uint64_t kPixelsOfByte = 8 * 1040;
-    constexpr std::uint64_t kMostBytes = std::uint64_t(1) << 30;
-    require_regular_file(path);
-    std::error_code error;
-    const std::uintmax_t size_of_file = std::filesystem::file_size(path, error);
-    if (error) fail(ErrorCode::io, path, error.message());
-    if (size_of_file > kMostBytes)
-        fail(ErrorCode::io, path,
-             fmt::format("has {} bytes; at most {} can be read", size_of_file, kMostBytes));
-    const std::string bytes = read_beginning(path, std::size_t(size_of_file));
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
-        fail(ErrorCode::io, path, image.message);
-    image.flags |=
-        PNG_IMAGE_FLAG_16BIT_sRGB;  // else 16 bits are taken for linear light, and 20,000 of 65,535 for 149 of 255
-    const std::uint64_t pixels_claimed = std::uint64_t(image.width) * image.height;
-    if (image.width > unsigned(kMaxExtent) || image.height > unsigned(kMaxExtent) ||
-        pixels_claimed > kMostColumns) {
-        png_image_free(&image);
-        fail(ErrorCode::usage, path,
-             fmt::format("has {} x {} pixels; at most {} along a side and {} in all can be read", image.width,
-                         image.height, kMaxExtent, kMostColumns));
-    }
-    if (pixels_claimed > bytes.size() * kPixelsOfByte) {
-        png_image_free(&image);
-        fail(ErrorCode::io, path,
-             fmt::format("is damaged: its head claims {} x {} pixels, more than {} bytes can hold",
-                         image.width, image.height, bytes.size()));
-    }
-    const Extent extent{int(image.width), int(image.height), 1};
-    std::vector<png_byte> pixels(extent.cells());
-    if (!read_grey(image, bytes, pixels)) fail(ErrorCode::io, path, image.message);
+    PngInput png(path, {.side = kMaxExtent, .pixels = kMostColumns});
+    const Extent extent{png.width(), png.height(), 1};
+    const std::vector<std::uint8_t> grey = png.grey();
     CloudMasks masks{{}, size, size, {0}, options.boundaries, true, 0, {}};
     masks.snapshots.push_back(plane_of(
         extent, options.threshold.value_or(kGreyThreshold),
-        [&](int i, int j, int) { return double(pixels[linear_index(extent, i, extent.y - 1 - j, 0)]); }));
+        [&](int i, int j, int) { return double(grey[linear_index(extent, i, extent.y - 1 - j, 0)]); }));
     return masks;
 }
 

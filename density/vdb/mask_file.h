@@ -7,9 +7,11 @@
 
 namespace nephos {
 
-// Returns a bool or mask grid as 1 where a voxel is active and true, and 0 elsewhere; a fog volume as it is. Without
-// options.grid it is `cld` if that is a mask, else `density`, else the first fog volume, else the first mask. All else is
-// that of load_density().
+// Returns a bool grid as 1 where a voxel is active and true, a mask grid as 1 where it is active, and 0 elsewhere; a fog volume as
+// it is. Without options.grid it is `cld` if that is a mask, else `density`, else the first fog volume, else the first mask.
+// Voxels along the axes that are as long as they are wide are those of the file, whatever their height (level_height_m). Others
+// that are no cubes have the value of the nearest one, with a note: means of neighbours would be cloud beside a cloud. All else
+// is that of load_density().
 LoadedDensity load_mask(const std::filesystem::path& path, const VdbReadOptions& options = {});
 
 }  // namespace nephos

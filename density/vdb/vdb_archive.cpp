@@ -84,6 +84,9 @@ std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
         number_ < 0 && number_ != std::numeric_limits<std::int64_t>::min() && size == -number_;
     if (!is_on_stack && is_negated && size > kLeastBlock && ::malloc_usable_size(to) < std::size_t(size))
         throw std::runtime_error("it is damaged: a chunk of " + std::to_string(size) + " bytes where fewer belong");
+    // The mask of a node goes to a block right before the byte that tells of its inactive values, and nothing between that and
+    // them does: what lies elsewhere, such as the flag of a tile, told of none.
+    if (!is_on_stack) inactive_values_ = 0;
     const std::streamsize got = FileBuffer::xsgetn(to, size);
     if (!is_on_stack && number_ == size && got == size && has_blosc()) check_blosc({to, std::size_t(size)});
     number_ = 0;

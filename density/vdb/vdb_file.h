@@ -177,6 +177,7 @@ struct LoadedDensity {
     VdbInfo info;                         // of all grids of the file, with VdbReadOptions::list_grids
     int refine = 1;  // voxels per cell of the lattice and axis; 1 unless the file says more
     std::uint64_t negative = 0;  // voxels below 0, which were set to 0
+    double level_height_m = 0;   // of a voxel: its edge, but for masks (mask_file.h)
     // One sentence for each adaptation (negative values set to 0, resampling ...).
     std::vector<std::string> notes;
 };

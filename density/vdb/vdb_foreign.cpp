@@ -59,32 +59,32 @@ Affine affine_of(const ForeignGrid& foreign) {
     return affine;
 }
 
-// For each of our axes the file's index axis along it, and whether it runs the same way.
+// For each of our axes the file's index axis along it, whether it runs the same way, and the edge of a voxel.
 struct AxisMap {
     std::array<int, 3> axis{};
     std::array<bool, 3> same{};
-    double edge = 0;
+    std::array<double, 3> edge{};
+
+    bool are_alike(std::size_t a, std::size_t b) const {
+        return std::abs(edge[a] - edge[b]) <= kTolerance * edge[a];
+    }
 };
 
+// Returns false where an index axis lies along none of ours.
 bool axis_map_of(const Affine& affine, AxisMap& map) {
-    map.edge = affine.columns[0].length();
     std::array<bool, 3> taken{};
     for (int c = 0; c < 3; ++c) {
         const Vec3d& column = affine.columns[std::size_t(c)];
-        if (std::abs(column.length() - map.edge) > kTolerance * map.edge) return false;
-        for (int r = 0; r < 3; ++r) {
-            if (std::abs(std::abs(column[r]) - map.edge) > kTolerance * map.edge) continue;
-            map.axis[std::size_t(r)] = c;
-            map.same[std::size_t(r)] = column[r] > 0;
-            taken[std::size_t(r)] = true;
-        }
-        // One component has the full length; the others must vanish.
-        const double rest =
-            column.lengthSqr() -
-            std::pow(std::max({std::abs(column[0]), std::abs(column[1]), std::abs(column[2])}), 2);
-        if (rest > kTolerance * kTolerance * map.edge * map.edge) return false;
+        int r = 0;
+        for (int other = 1; other < 3; ++other)
+            if (std::abs(column[other]) > std::abs(column[r])) r = other;
+        const double along = std::abs(column[r]), rest = column.lengthSqr() - along * along;
+        if (rest > kTolerance * kTolerance * along * along) return false;
+        map.axis[std::size_t(r)] = c;
+        map.same[std::size_t(r)] = column[r] > 0;
+        map.edge[std::size_t(r)] = along;
+        taken[std::size_t(r)] = true;
     }
-    map.edge = std::abs(affine.columns[std::size_t(map.axis[0])][0]);  // a length is rounded
     return taken[0] && taken[1] && taken[2];
 }
 
@@ -147,7 +147,7 @@ class Permuter {
         }
         for (auto leaf = work_.cbeginLeaf(); leaf; ++leaf)
             receiver_.leaf(leaf->origin(), leaf->buffer().data());
-        return {false, sanitise_.negative()};
+        return {false, sanitise_.negative(), map_.edge[2]};
     }
 
   private:
@@ -225,7 +225,7 @@ class Permuter {
     Sanitiser sanitise_;
 };
 
-// Gives BoxSampler the values as a fog volume has them: inactive ones 0.
+// Gives samplers the values as a fog volume has them: inactive ones 0.
 struct ActiveValues {
     using ValueType = float;
     FloatGrid::ConstUnsafeAccessor voxels;
@@ -236,7 +236,7 @@ struct ActiveValues {
     }
 };
 
-// Trilinear samples on cubes whose edge is the file's shortest voxel edge.
+// Samples on cubes whose edge is the file's shortest voxel edge: trilinear ones, of a mask the nearest voxel's.
 class Skewed {
   public:
     Skewed(const ForeignGrid& foreign, const Affine& affine) : foreign_(foreign), affine_(affine) {
@@ -262,12 +262,14 @@ class Skewed {
                 if (voxel.x() >= extent_.x || voxel.y() >= extent_.y || voxel.z() >= extent_.z) continue;
                 const Vec3d world = low_ + (voxel.asVec3d() + Vec3d(0.5)) * edge_;
                 const Vec3d index = foreign_.grid->transform().worldToIndex(to_file(world));
-                values[n] = sanitise(openvdb::tools::BoxSampler::sample(values_in_file, index));
+                values[n] =
+                    sanitise(foreign_.is_mask ? openvdb::tools::PointSampler::sample(values_in_file, index)
+                                              : openvdb::tools::BoxSampler::sample(values_in_file, index));
                 any = any || values[n] > 0;
             }
             if (any) receiver.leaf(origin, values);
         }
-        return {true, sanitise.negative()};
+        return {true, sanitise.negative(), edge_};
     }
 
   private:
@@ -346,15 +348,16 @@ class Skewed {
 ForeignResult convert_foreign(const ForeignGrid& foreign, const DensityReceiver& receiver) {
     const Affine affine = affine_of(foreign);
     AxisMap map;
-    if (!axis_map_of(affine, map)) return Skewed(foreign, affine).run(receiver);
+    const bool are_along = axis_map_of(affine, map) && map.are_alike(0, 1);
+    if (!are_along || !(foreign.is_mask || map.are_alike(0, 2))) return Skewed(foreign, affine).run(receiver);
     std::array<double, 3> size{};
     Vec3d low = affine(foreign.bounds.min().asVec3d());
     low = openvdb::math::minComponent(low, affine(foreign.bounds.max().asVec3d()));
     for (std::size_t r = 0; r < 3; ++r) {
         size[r] = double(foreign.bounds.max()[map.axis[r]]) - double(foreign.bounds.min()[map.axis[r]]) + 1;
-        low[int(r)] -= map.edge / 2;  // from the centre of the lowest voxel to its corner
+        low[int(r)] -= map.edge[r] / 2;  // from the centre of the lowest voxel to its corner
     }
-    receiver.begin(checked_extent(size), {{low.x(), low.y(), low.z()}, map.edge});
+    receiver.begin(checked_extent(size), {{low.x(), low.y(), low.z()}, map.edge[0]});
     return Permuter(foreign.bounds, map, receiver).run(foreign.grid->tree());
 }
 

@@ -27,11 +27,15 @@ struct ForeignGrid {
     bool y_up = false;
     double metres_per_unit = 1;
     std::size_t memory_bytes = 0;  // no result larger than this
+    // Voxels are cloud or not: those along the axes that are as long as they are wide are taken as they are, of whatever height, and
+    // where voxels are resampled, each takes the nearest one's value.
+    bool is_mask = false;
 };
 
 struct ForeignResult {
     bool resampled = false;
     std::uint64_t negative = 0;  // voxels below 0 that became 0
+    double level_height_m = 0;   // of a voxel; its edge but for masks
 };
 
 // Converts a grid and passes it to `receiver`. Throws std::runtime_error when it cannot be represented: a

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <stdexcept>
+#include <type_traits>
 
 #include <openvdb/openvdb.h>
 
@@ -100,12 +101,17 @@ FloatGrid::Ptr float_grid(const openvdb::GridBase& grid, const FloatTree::Ptr& t
     return result;
 }
 
+// Whether the voxels of a tree have no value but that they are active. Its tiles store one all the same, which says nothing.
+template <typename Tree>
+constexpr bool kIsActivityAlone = std::is_same_v<typename Tree::BuildType, openvdb::ValueMask>;
+
 // 1 where a voxel of a mask is active, and true where it has a value.
 template <typename Grid>
 FloatGrid::Ptr mask_as_float(const Grid& mask) {
     return float_grid(mask, float_tree(mask.tree(), 0.0f, [](bool value, bool is_active) {
-                          const bool is_set = value && is_active;
-                          return FloatVoxel{is_set ? 1.0f : 0.0f, is_set};
+                          const bool is_set =
+                              is_active && (value || kIsActivityAlone<typename Grid::TreeType>);
+                          return FloatVoxel{is_set ? 1.0f : 0.0f, is_active};
                       }));
 }
 
@@ -245,12 +251,13 @@ void send_density(VdbArchive& archive, const VdbReadOptions& options, bool masks
     receiver.leaf = [&](const Coord& origin, const float* values) { send_leaf(writer, origin, values); };
     receiver.tile = [&](const Coord& origin, float value) { send_tile(writer, origin, value); };
     const bool y_up = has_y_up(header, archive.metadata(), options.up_axis);
-    const ForeignGrid foreign{grid.get(), bounds_of(*grid, header), y_up, options.metres_per_unit,
-                              memory_bytes};
+    const ForeignGrid foreign{
+        grid.get(), bounds_of(*grid, header), y_up, options.metres_per_unit, memory_bytes, masks};
     const ForeignResult result = convert_foreign(foreign, receiver);
     send_end(writer);
     writer.value(std::uint8_t(result.resampled));
     writer.value(result.negative);
+    writer.value(result.level_height_m);
 }
 
 // The parent's part: builds the grid from the child's stream.
@@ -273,6 +280,9 @@ LoadedDensity receive_density(SandboxReader& reader, bool list_grids) {
     ForeignResult result;
     result.resampled = reader.value<std::uint8_t>() != 0;
     result.negative = reader.value<std::uint64_t>();
+    loaded.level_height_m = reader.value<double>();
+    if (!(loaded.level_height_m > 0) || !std::isfinite(loaded.level_height_m))
+        throw std::runtime_error("the reading process sent an impossible size");
     if (result.resampled) {
         loaded.notes.push_back("its voxels are not cubes along the axes: resampled to voxels of " +
                                number_text(placement.cell_size_m, 6) + " m");
@@ -303,7 +313,8 @@ void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& na
     for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
         std::uint64_t words[8] = {};
         for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) {
-            if (*voxel) words[voxel.pos() >> 6] |= std::uint64_t{1} << (voxel.pos() & 63);
+            if (*voxel || kIsActivityAlone<Tree>)
+                words[voxel.pos() >> 6] |= std::uint64_t{1} << (voxel.pos() & 63);
         }
         if (std::ranges::any_of(words, [](std::uint64_t word) { return word != 0; }))
             send(leaf->origin(), words);
@@ -313,7 +324,7 @@ void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& na
     auto tile = tree.cbeginValueOn();
     tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
     for (; tile; ++tile) {
-        if (!*tile) continue;
+        if (!*tile && !kIsActivityAlone<Tree>) continue;
         const CoordBBox box = tile.getBoundingBox();
         for (int z = box.min().z(); z <= box.max().z(); z += kBlock) {
             for (int y = box.min().y(); y <= box.max().y(); y += kBlock) {

@@ -47,19 +47,23 @@ struct Points {
     openvdb::Vec3d first, spacing;
 };
 
-Points points_of(const openvdb::GridBase& grid, const Coord& low) {
+// Throws where an axis is not that of the world, to a hundredth of a voxel at the far side of the box.
+Points points_of(const openvdb::GridBase& grid, const CoordBBox& box) {
     const openvdb::math::Transform& transform = grid.transform();
     const openvdb::Vec3d zero = transform.indexToWorld(openvdb::Vec3d(0.0));
-    Points points{transform.indexToWorld(low.asVec3d()), {}};
+    Points points{transform.indexToWorld(box.min().asVec3d()), {}};
     bool along = transform.isLinear();
+    openvdb::Vec3d beside(0.0);  // how far the far side lies beside its place
     for (int axis = 0; along && axis < 3; ++axis) {
         openvdb::Vec3d step(0.0);
         step[axis] = 1;
         const openvdb::Vec3d to = transform.indexToWorld(step) - zero;
         points.spacing[axis] = to[axis];
-        const double length = to.length();
-        along = std::isfinite(length) && to[axis] > 0 && length - to[axis] <= 1e-6 * length;
+        along = std::isfinite(to.length()) && to[axis] > 0;
+        for (int other = 0; other < 3; ++other)
+            if (other != axis) beside[other] += std::abs(to[other]) * box.dim()[axis];
     }
+    for (int axis = 0; axis < 3; ++axis) along = along && beside[axis] <= 0.01 * points.spacing[axis];
     if (!along)
         throw std::runtime_error("its axes are turned, mirrored or not straight; expected voxels along east, north and up");
     return points;
@@ -102,7 +106,7 @@ void send_samples(VdbArchive& archive, const std::string& name, int parts, std::
     const auto grid = archive.read(chosen_grid(archive, name, parts));
     const CoordBBox box = grid->evalActiveVoxelBoundingBox();
     if (box.empty()) throw std::runtime_error("grid `" + grid->getName() + "` has no active voxel");
-    const Points points = points_of(*grid, box.min());
+    const Points points = points_of(*grid, box);
     double bytes = double(parts) * sizeof(float);
     for (int axis = 0; axis < 3; ++axis) {
         const double size = double(box.max()[axis]) - box.min()[axis] + 1;

@@ -2,6 +2,7 @@
 
 // Chunks of voxels whose sizes lie, and numbers that only look like such sizes.
 
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -167,6 +168,50 @@ TEST(VdbRead, InactiveValuesAreNoSizesOfChunks) {
             EXPECT_EQ(read_vdb_info(folder / "ids.vdb").grids.size(), 2u) << value;
             EXPECT_NO_THROW(load_density(folder / "ids.vdb")) << value;
         }
+}
+
+// The flag of a tile is a byte on the stack, too. Taken for one that tells of inactive values, it would hide the size of the chunk.
+TEST(VdbRead, FlagsOfTilesHideNoSizesOfChunks) {
+    const TemporaryFolder folder;
+    openvdb::initialize();
+    auto mask = openvdb::BoolGrid::create(false);
+    mask->setName("cld");
+    {
+        std::ofstream file(folder / "empty.vdb", std::ios::binary);
+        openvdb::io::Stream out(file);
+        out.setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
+        out.write(openvdb::GridCPtrVec{mask});
+    }
+    std::vector<char> file = test::bytes_of(folder / "empty.vdb");
+    const auto add = [&](const auto& value) {
+        const auto* bytes = reinterpret_cast<const char*>(&value);
+        file.insert(file.end(), bytes, bytes + sizeof value);
+    };
+    constexpr std::size_t kEmptyTree = 13;  // number of buffers, background, numbers of tiles and children
+    constexpr std::size_t kMask = 32 * 32 * 32 / 8;
+    constexpr std::int64_t kMore = 200'000;
+    const std::vector<char> head(file.begin(), file.end() - kEmptyTree);
+    for (const char flag : {1, 2, 4, 5}) {
+        file = head;
+        add(std::int32_t(1));
+        add(char(0));
+        add(std::uint32_t(1));
+        add(std::uint32_t(1));
+        add(std::array<std::int32_t, 3>{0, 0, 0});
+        add(char(0));
+        add(flag);
+        add(std::array<std::int32_t, 3>{4096, 0, 0});
+        file.insert(file.end(), 2 * kMask, 0);
+        file[file.size() - kMask] = 0x20;  // a value
+        add(char(openvdb::io::NO_MASK_AND_ONE_INACTIVE_VAL));
+        add(flag);  // the inactive value
+        add(-kMore);
+        file.insert(file.end(), std::size_t(kMore), 'A');
+        test::write_bytes(folder / "hostile.vdb", file);
+        EXPECT_NE(error_of(folder / "hostile.vdb").find("a chunk of 200000 bytes where fewer belong"),
+                  std::string::npos)
+            << int(flag) << ": " << error_of(folder / "hostile.vdb");
+    }
 }
 
 // Inactive values of 8 bytes, all that their nodes store, before the mask of the node below. OpenVDB writes no such bits itself.
