@@ -9,7 +9,7 @@
 //             fastest, as their CF attributes and names tell (cloud_mask_axes.h); levels of a coordinate that tells that they
 //             go downwards are turned over. Several times are several snapshots. Values are unpacked, and missing ones (NaN,
 //             _FillValue, missing_value, outside valid_range) are clear, and counted
-//     .png    grey, seen from above, north up; at most 2^28 pixels
+//     .png    seen from above, north up; at most 2^28 pixels. Of a colour its luminance, of 255 as in sRGB, what is transparent over black
 //
 // A picture, and a variable without levels or with one whose height is not given, is a view from above: what needs a vertical
 // has no value.

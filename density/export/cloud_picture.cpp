@@ -9,9 +9,8 @@
 #include <new>
 #include <optional>
 
-#include <png.h>
-
 #include "core/atomic_file.h"
+#include "core/png/png_input.h"
 #include "density/export/png_bytes.h"
 #include "density/export/whole_file.h"
 
@@ -190,58 +189,29 @@ void write_cloud_picture(const std::filesystem::path& path, const CloudVoxels& c
     write_atomically(path, std::string_view(png));
 }
 
-namespace {
-
-// Frees what libpng has made for an image.
-struct PngImageEnd {
-    png_image& image;
-    ~PngImageEnd() { png_image_free(&image); }
-};
-
-// Throws Error(io) unless a PNG file ends with its last chunk, which libpng does not look for.
-void require_end(std::span<const std::byte> file) {
-    constexpr unsigned char kLastChunk[] = {0, 0, 0, 0, 'I', 'E', 'N', 'D', 0xAE, 0x42, 0x60, 0x82};
-    const std::span<const std::byte> last = std::as_bytes(std::span(kLastChunk));
-    if (file.size() < last.size() || !std::ranges::equal(file.last(last.size()), last))
-        throw Error(ErrorCode::io, "it is no PNG file, ends early, or goes on behind its picture");
-}
-
-}  // namespace
-
 CloudVoxels read_cloud_picture(const std::filesystem::path& path) {
     return with_whole_file(path, [](ByteReader& reader) {
-        const std::span<const std::byte> bytes = reader.rest();
-        require_end(bytes);
-        png_image image{};
-        const PngImageEnd end{image};
-        image.version = PNG_IMAGE_VERSION;
-        const auto check = [&](int status) {
-            if (status != 0) return;
-            if (is_lack_of_memory(image.message)) throw std::bad_alloc();
-            throw Error(ErrorCode::io, "it is no PNG file, or is damaged");
-        };
-        check(png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()));
-        image.format = PNG_FORMAT_RGBA;
-        CloudVoxels cloud{int(image.height), int(image.width / std::max(1u, image.height)), {}, 0};
+        PngInput picture(reader.rest(), {});
+        CloudVoxels cloud{picture.height(), picture.width() / picture.height(), {}, 0};
         const bool known = std::ranges::find(kSides, cloud.side) != std::end(kSides);
-        // PNG packs at most 1,032 bytes into one: what states more is damaged, and needs no memory.
-        if (!known || image.width % image.height != 0 ||
-            std::uint64_t(image.width) * image.height * kChannels > 1032 * std::uint64_t(bytes.size()) + 1024)
+        if (!known || picture.width() % picture.height() != 0 || picture.channels() != int(kChannels) ||
+            picture.bits() != 8)
             throw Error(ErrorCode::io, "it is no picture of a cloud's voxels");
-        std::vector<std::uint8_t> pixels(PNG_IMAGE_SIZE(image));
-        check(png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr));
-        const auto side = std::size_t(cloud.side), width = std::size_t(image.width);
+        const std::vector<std::byte> samples = picture.samples();
+        if (picture.goes_on()) throw Error(ErrorCode::io, "it goes on behind its picture");
+        const auto side = std::size_t(cloud.side), width = std::size_t(picture.width());
         std::optional<std::uint8_t> type;
         cloud.codes.resize(side * side * std::size_t(cloud.height));
         for (std::size_t k = 0; k < std::size_t(cloud.height); ++k)
             for (std::size_t j = 0; j < side; ++j)
                 for (std::size_t i = 0; i < side; ++i) {
-                    const std::uint8_t* pixel =
-                        pixels.data() + ((side - 1 - j) * width + k * side + i) * kChannels;
-                    const std::uint8_t code = pixel[2];
+                    const std::byte* bytes =
+                        samples.data() + ((side - 1 - j) * width + k * side + i) * kChannels;
+                    const auto sample = [&](int c) { return std::to_integer<std::uint8_t>(bytes[c]); };
+                    const std::uint8_t code = sample(2);
                     cloud.codes[(k * side + j) * side + i] = code;
-                    if (code > 0) type = type.value_or(pixel[1]);
-                    if (pixel[0] != 0 || pixel[1] != (code > 0 ? *type : 0) || pixel[3] != 255)
+                    if (code > 0) type = type.value_or(sample(1));
+                    if (sample(0) != 0 || sample(1) != (code > 0 ? *type : 0) || sample(3) != 255)
                         throw Error(ErrorCode::io,
                                     "its voxels are not opaque, without red, and of one type: expected a "
                                     "picture that nephos has written");

@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <csetjmp>
 #include <cstring>
 #include <new>
 #include <string_view>
 
-#include <png.h>
 #include <zlib.h>
 
 #include "core/atomic_file.h"
+#include "core/png/png_input.h"
 #include "core/text.h"
 #include "density/export/containers.h"
 #include "density/export/png_bytes.h"
@@ -287,102 +286,29 @@ void write_slices(const std::filesystem::path& path, const EncodedVolume& volume
     write_atomically(path, std::string_view(png));
 }
 
-namespace {
-
-// A grey picture while it is read; outlives the jumps of libpng.
-struct GreyPicture {
-    std::span<const std::byte> left;  // of the file
-    std::uint32_t width = 0, height = 0;
-    int depth = 0;                   // bits of a sample, 8 or 16
-    std::vector<std::byte> samples;  // as voxels have them
-    const char* problem = "it is no PNG file, or is damaged";
-    bool lacks_memory = false;
-};
-
-[[noreturn]] void note_and_jump(png_structp png, png_const_charp reason) {
-    static_cast<GreyPicture*>(png_get_error_ptr(png))->lacks_memory = is_lack_of_memory(reason);
-    png_longjmp(png, 1);
-}
-
-void take_png(png_structp png, png_bytep data, png_size_t size) {
-    auto* picture = static_cast<GreyPicture*>(png_get_io_ptr(png));
-    if (size > picture->left.size()) png_error(png, "ends early");
-    std::memcpy(data, picture->left.data(), size);
-    picture->left = picture->left.subspan(size);
-}
-
-// Reads what has been made sure of: `picture.problem` says what failed when libpng jumps.
-void read_rows(png_structp png, png_infop info, GreyPicture& picture) {
-    const std::size_t file_bytes = picture.left.size();
-    png_set_read_fn(png, &picture, take_png);
-    png_read_info(png, info);
-    picture.width = png_get_image_width(png, info);
-    picture.height = png_get_image_height(png, info);
-    picture.depth = png_get_bit_depth(png, info);
-    if (png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || picture.depth < 8 ||
-        png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) {
-        picture.problem = "it is no grey picture of 8 or 16 bits";
-        png_error(png, picture.problem);
-    }
-    const std::size_t row_bytes = std::size_t(picture.width) * std::size_t(picture.depth / 8);
-    if (row_bytes * picture.height > most_inflated(file_bytes)) {
-        picture.problem = "it states more pixels than it can hold";
-        png_error(png, picture.problem);
-    }
-    if (picture.depth == 16) png_set_swap(png);  // PNG is big-endian
-    picture.samples.resize(row_bytes * picture.height);
-    for (std::uint32_t y = 0; y < picture.height; ++y)
-        png_read_row(png, reinterpret_cast<png_bytep>(picture.samples.data() + y * row_bytes), nullptr);
-    png_read_end(png, nullptr);
-    if (!picture.left.empty()) {
-        picture.problem = "it goes on behind its picture";
-        png_error(png, picture.problem);
-    }
-}
-
-void read_grey(GreyPicture& picture) {
-    // Errors jump back; the library's warnings are not for the terminal.
-    png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &picture, note_and_jump,
-                                             [](png_structp, png_const_charp) {});
-    png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
-    if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {  // NOLINT: libpng reports by longjmp
-        const bool lacks_memory = info == nullptr || picture.lacks_memory;
-        png_destroy_read_struct(&png, &info, nullptr);
-        if (lacks_memory) throw std::bad_alloc();
-        throw Error(ErrorCode::io, picture.problem);
-    }
-    try {
-        read_rows(png, info, picture);
-    } catch (...) {
-        png_destroy_read_struct(&png, &info, nullptr);
-        throw;
-    }
-    png_destroy_read_struct(&png, &info, nullptr);
-}
-
-}  // namespace
-
 EncodedVolume read_slices(const std::filesystem::path& path, int nx, int ny, int nz, int columns) {
     return with_whole_file(path, [&](ByteReader& reader) {
-        GreyPicture picture;
-        picture.left = reader.rest();
-        read_grey(picture);
+        PngInput picture(reader.rest(), {});
+        if (picture.channels() != 1 || picture.is_interlaced())
+            throw Error(ErrorCode::io, "it is no grey picture of 8 or 16 bits");
         const int rows = (nz + columns - 1) / columns;
-        if (std::int64_t(picture.width) != std::int64_t(nx) * columns ||
-            std::int64_t(picture.height) != std::int64_t(ny) * rows)
+        if (std::int64_t(picture.width()) != std::int64_t(nx) * columns ||
+            std::int64_t(picture.height()) != std::int64_t(ny) * rows)
             throw Error(ErrorCode::io, "it is no picture of slices of this size");
-        const std::size_t voxel = std::size_t(picture.depth / 8), row_bytes = std::size_t(nx) * voxel;
+        const std::vector<std::byte> samples = picture.samples();
+        if (picture.goes_on()) throw Error(ErrorCode::io, "it goes on behind its picture");
+        const std::size_t voxel = std::size_t(picture.bits() / 8), row_bytes = std::size_t(nx) * voxel;
         EncodedVolume volume{voxel == 1 ? VoxelType::r8 : VoxelType::r16, {}};
         VolumeLevel level{nx, ny, nz, std::vector<std::byte>(encoded_bytes(nx, ny, nz, volume.type))};
         for (int k = 0; k < nz; ++k) {
             for (int y = 0; y < ny; ++y) {
-                const std::size_t from =
-                    ((std::size_t(k / columns) * std::size_t(ny) + std::size_t(y)) * picture.width +
-                     std::size_t(k % columns) * std::size_t(nx)) *
-                    voxel;
+                const std::size_t from = ((std::size_t(k / columns) * std::size_t(ny) + std::size_t(y)) *
+                                              std::size_t(picture.width()) +
+                                          std::size_t(k % columns) * std::size_t(nx)) *
+                                         voxel;
                 std::memcpy(
                     level.bytes.data() + (std::size_t(k) * std::size_t(ny) + std::size_t(y)) * row_bytes,
-                    picture.samples.data() + from, row_bytes);
+                    samples.data() + from, row_bytes);
             }
         }
         volume.levels.push_back(std::move(level));

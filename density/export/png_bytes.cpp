@@ -6,7 +6,6 @@
 #include <cstring>
 #include <exception>
 #include <new>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include <zlib.h>
 
 #include "core/error.h"
+#include "core/png/png_input.h"
 
 namespace nephos {
 namespace {
@@ -88,11 +88,6 @@ std::string png_bytes(const std::filesystem::path& path, const PngShape& shape,
     throw Error(ErrorCode::io, path.string() + ": libpng cannot encode a picture of " +
                                    std::to_string(shape.width) + " x " + std::to_string(shape.height) +
                                    " pixels: " + writing.reason);
-}
-
-bool is_lack_of_memory(const char* reason) {
-    const std::string_view text(reason);  // not "invalid memory read", of a file that ends early
-    return text.find("nsufficient memory") != text.npos || text.find("ut of memory") != text.npos;
 }
 
 }  // namespace nephos

@@ -26,7 +26,4 @@ struct PngShape {
 std::string png_bytes(const std::filesystem::path& path, const PngShape& shape,
                       const std::function<void(std::uint32_t y, std::span<std::byte> row)>& fill);
 
-// Returns whether libpng gives this reason for a lack of memory.
-bool is_lack_of_memory(const char* reason);
-
 }  // namespace nephos

@@ -6,12 +6,12 @@
 #include <string>
 
 #include "core/error.h"
-#include "render/image/png_input.h"
+#include "core/png/png_input.h"
 
 namespace nephos {
 namespace {
 
-constexpr png_uint_32 kMaxSide = 8192;
+constexpr int kMaxSide = 8192;
 
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
     throw Error(ErrorCode::io, path.string() + ": " + reason);
@@ -20,15 +20,15 @@ constexpr png_uint_32 kMaxSide = 8192;
 }  // namespace
 
 AlphaImage read_alpha_image(const std::filesystem::path& path) {
-    PngInput png(path, kMaxSide);
+    PngInput png(path, {.side = kMaxSide});
     if (!png.has_alpha())
         fail(path, "has no alpha channel; expected a PNG with transparency, whose alpha is the opacity");
-    // 16 bits, luminance times alpha
-    std::vector<std::uint16_t> pixels(png.bytes(PNG_FORMAT_LINEAR_Y_ALPHA) / sizeof(std::uint16_t));
-    png.read(pixels.data());
+    const std::vector<std::uint16_t> pixels = png.luminance_alpha();
     AlphaImage image;
     image.width = png.width();
     image.height = png.height();
+    image.opacity.reserve(pixels.size() / 2);
+    image.bright.reserve(pixels.size() / 2);
     for (std::size_t at = 0; at + 1 < pixels.size(); at += 2) {
         image.opacity.push_back(float(pixels[at + 1]) / 65535.0f);
         image.bright.push_back(std::min(float(pixels[at]), float(pixels[at + 1])) / 65535.0f);

@@ -12,7 +12,8 @@ namespace nephos {
 struct AlphaImage {
     int width = 0, height = 0;
     std::vector<float> opacity;  // 0..1, alpha as it is in the file
-    std::vector<float> bright;   // linear luminance of the file's sRGB colour, times opacity: 0..opacity
+    std::vector<float>
+        bright;  // linear luminance of the file's colour (core/png/png_input.h), times opacity: 0..opacity
 };
 
 // Reads a PNG of any kind that has transparency, up to 8192 on a side. Throws Error(io) naming the file when it cannot

@@ -18,7 +18,7 @@ struct ExrGrid {
 void prepare_exr();
 
 // Reads the only channel of the first part of an open file, or of several the one named Z, Y, height or R. Throws
-// std::runtime_error with what is wrong: no EXR, no such channel, several samples a pixel or fewer than one, a side
+// std::runtime_error with what is wrong: no EXR, a chunk that does not give its pixels, a data window that is not the display window, no such channel, several samples a pixel or fewer than one, a side
 // outside of 2..most.
 ExrGrid parse_exr_grid(int fd, int most);
 

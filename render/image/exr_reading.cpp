@@ -8,6 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <OpenEXR/ImfBoxAttribute.h>
@@ -16,23 +17,26 @@
 #include <OpenEXR/ImfCompressionAttribute.h>
 #include <OpenEXR/ImfDoubleAttribute.h>
 #include <OpenEXR/ImfFloatAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
-#include <OpenEXR/ImfIntAttribute.h>
-#include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfRationalAttribute.h>
 #include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfTiledInputPart.h>
 #include <OpenEXR/ImfVecAttribute.h>
 #include <fcntl.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "density/vdb/sandbox.h"
+#include "render/image/exr_chunks.h"
 #include "render/image/exr_grid.h"
 #include "render/image/image_file.h"
 
@@ -103,6 +107,11 @@ std::string attribute_text(const Imf::Attribute& attribute) {
     return std::string("<") + attribute.typeName() + ">";
 }
 
+std::string text_of(const Imath::Box2i& window) {
+    return "(" + joined(9, window.min.x, window.min.y) + ") to (" + joined(9, window.max.x, window.max.y) +
+           ")";
+}
+
 // Returns true for attributes that other fields of ExrPart contain.
 bool is_structural(const std::string& name) {
     for (const char* known :
@@ -130,6 +139,15 @@ ExrPart describe(const Imf::Header& header) {
     return part;
 }
 
+constexpr std::string_view kCannotRead =
+    "cannot read: ";  // begins what the parent takes for an error of the system
+
+// Throws what was thrown while `what` was done, as one message.
+[[noreturn]] void rethrow(const std::string& what, const std::exception& reason) {
+    if (std::string_view(reason.what()).starts_with(kCannotRead)) throw std::runtime_error(reason.what());
+    throw std::runtime_error("cannot read " + what + ": " + reason.what());
+}
+
 // An open file, for a process that may open none.
 class OpenFile : public Imf::IStream {
   public:
@@ -154,7 +172,7 @@ class OpenFile : public Imf::IStream {
         do {
             got = ::pread(fd_, buffer_.data(), buffer_.size(), off_t(at_));
         } while (got < 0 && errno == EINTR);
-        if (got < 0) throw std::runtime_error(std::strerror(errno));
+        if (got < 0) throw std::runtime_error(std::string(kCannotRead) + std::strerror(errno));
         if (got == 0) throw std::runtime_error("it ends early");
         begin_ = at_;
         filled_ = std::uint64_t(got);
@@ -204,6 +222,54 @@ ExrPart received(SandboxReader& reader) {
     return part;
 }
 
+bool is_dwa(Imf::Compression compression) {
+    return compression == Imf::DWAA_COMPRESSION || compression == Imf::DWAB_COMPRESSION;
+}
+
+// Decodes the channel of the first part; backwards: from the last chunk to the first.
+std::vector<float> pixels_of(int fd, const std::string& channel, bool backwards) {
+    OpenFile stream(fd, "heights");
+    Imf::MultiPartInputFile file(stream, 0);  // no threads
+    const Imf::Header& header = file.header(0);
+    const Imath::Box2i window = header.dataWindow();
+    const auto columns = std::size_t(window.max.x - window.min.x + 1),
+               rows = std::size_t(window.max.y - window.min.y + 1);
+    std::vector<float> pixels(columns * rows);
+    Imf::FrameBuffer buffer;
+    buffer.insert(
+        channel, Imf::Slice::Make(Imf::FLOAT, pixels.data(), window, sizeof(float), sizeof(float) * columns));
+    const auto each = [&](int count, const auto& read) {
+        for (int n = 0; n < count; ++n) read(backwards ? count - 1 - n : n);
+    };
+    if (header.hasTileDescription()) {
+        Imf::TiledInputPart part(file, 0);
+        part.setFrameBuffer(buffer);
+        const int across = part.numXTiles(0);
+        each(across * part.numYTiles(0), [&](int n) { part.readTile(n % across, n / across); });
+    } else {
+        Imf::InputPart part(file, 0);
+        part.setFrameBuffer(buffer);
+        constexpr int kRows = 32;  // of a chunk of DWAA; of DWAB they are 256
+        each(int((rows + kRows - 1) / kRows), [&](int n) {
+            const int first = window.min.y + n * kRows;
+            part.readPixels(first, std::min(first + kRows - 1, window.max.y));
+        });
+    }
+    return pixels;
+}
+
+// A chunk of DWA, whose size nobody compares with that of its pixels, leaves in them what was in memory before: other
+// memory in another order of chunks makes other pixels.
+std::vector<float> pixels_of_dwa(int fd, const std::string& channel) {
+    ::mallopt(M_PERTURB, 0x55);
+    std::vector<float> pixels = pixels_of(fd, channel, false);
+    ::mallopt(M_PERTURB, 0x2A);
+    const std::vector<float> again = pixels_of(fd, channel, true);
+    if (std::memcmp(pixels.data(), again.data(), sizeof(float) * pixels.size()) != 0)
+        throw std::runtime_error("a chunk does not give all of its pixels");
+    return pixels;
+}
+
 }  // namespace
 
 void prepare_exr() { Imf::staticInitialize(); }
@@ -220,6 +286,10 @@ ExrGrid parse_exr_grid(int fd, int most) {
             throw std::runtime_error("it is " + std::to_string(columns) + " x " + std::to_string(rows) +
                                      " heights; expected 2 to " + std::to_string(most) + " on a side");
         }
+        if (const Imath::Box2i display = header.displayWindow(); display != window)
+            throw std::runtime_error("its data window is " + text_of(window) + ", its display window " +
+                                     text_of(display) +
+                                     "; expected the same, a height in each pixel of the map");
         const Imf::ChannelList& channels = header.channels();
         std::string name, all;
         int count = 0;
@@ -237,19 +307,13 @@ ExrGrid parse_exr_grid(int fd, int most) {
             throw std::runtime_error("its channels are " + all + "; expected one alone, or one named Z, Y, height or R");
         if (channel->xSampling != 1 || channel->ySampling != 1)
             throw std::runtime_error("its channel " + name + " has fewer samples than pixels");
-        ExrGrid grid{int(columns), int(rows), {}};
-        grid.values.resize(std::size_t(columns) * std::size_t(rows));
-        const std::size_t row = sizeof(float) * std::size_t(columns);
-        Imf::FrameBuffer buffer;
-        buffer.insert(name, Imf::Slice::Make(Imf::FLOAT, grid.values.data(), window, sizeof(float), row));
-        Imf::InputPart part(file, 0);
-        part.setFrameBuffer(buffer);
-        part.readPixels(window.min.y, window.max.y);
-        return grid;
+        require_whole_chunks(fd);
+        return {int(columns), int(rows),
+                is_dwa(header.compression()) ? pixels_of_dwa(fd, name) : pixels_of(fd, name, false)};
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& reason) {
-        throw std::runtime_error(std::string("cannot read heights of OpenEXR: ") + reason.what());
+        rethrow("heights of OpenEXR", reason);
     }
 }
 
@@ -274,7 +338,7 @@ ExrInfo read_exr_info(const std::filesystem::path& path) {
             } catch (const std::bad_alloc&) {
                 throw;
             } catch (const std::exception& reason) {
-                throw std::runtime_error(std::string("cannot read OpenEXR: ") + reason.what());
+                rethrow("OpenEXR", reason);
             }
         },
         [&](SandboxReader& reader) {

@@ -1,28 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cerrno>
 #include <charconv>
+#include <cmath>
 #include <csetjmp>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <png.h>
 
 #include "core/atomic_file.h"
-#include "core/descriptor.h"
 #include "core/error.h"
+#include "core/png/png_input.h"
 #include "core/text.h"
 #include "render/image/exposure.h"
 #include "render/image/image_file.h"
-#include "render/image/png_input.h"
 #include "render/image/tone_map.h"
 
 namespace nephos {
 namespace {
 
-constexpr png_uint_32 kMaxSide = 16384;
+constexpr int kMaxSide = 16384;
 constexpr int kCompressionLevel = 4;
 
 using Texts = std::vector<std::pair<std::string, std::string>>;
@@ -152,41 +151,21 @@ void write_png(const std::filesystem::path& path, const Rgb8Image& image, const 
     write_atomically(path, std::string_view(exchange.file));
 }
 
-// Chunks follow a signature of 8 bytes: length, most significant byte first; type; content; checksum. Content
-// of an iTXt chunk: keyword, 0, two flags, two texts that end with 0, text.
 double read_png_exposure(const std::filesystem::path& path) {
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
-    if (!stream) fail(path, "cannot read PNG", std::strerror(errno));
-    stream.seekg(8);
-    const std::string key = std::string("exposure") + std::string(5, '\0');
-    unsigned char head[8];
-    while (stream.read(reinterpret_cast<char*>(head), sizeof head)) {
-        const std::uint32_t length = std::uint32_t(head[0]) << 24 | std::uint32_t(head[1]) << 16 |
-                                     std::uint32_t(head[2]) << 8 | head[3];
-        const std::string type(reinterpret_cast<const char*>(head) + 4, 4);
-        if (type != "iTXt" || length > 4096) {
-            stream.seekg(std::streamoff(length) + 4, std::ios::cur);
-            continue;
-        }
-        std::string content(length + 4, '\0');
-        if (!stream.read(content.data(), std::streamsize(content.size()))) break;
-        content.resize(length);
-        if (!content.starts_with(key)) continue;
-        double value = 0;
-        const char *from = content.data() + key.size(), *end = content.data() + content.size();
-        if (const auto [rest, error] = std::from_chars(from, end, value); error == std::errc() && rest == end)
+    const std::optional<std::string> text =
+        PngInput(path, {.side = kMaxSide, .texts = true}).text("exposure");
+    double value = 0;
+    const char* end = text ? text->data() + text->size() : nullptr;
+    if (text)
+        if (const auto [rest, error] = std::from_chars(text->data(), end, value);
+            error == std::errc() && rest == end && std::isfinite(value))
             return value;
-    }
-    check_reading(stream, path);
     fail(path, "cannot read the exposure of the PNG", "it has no text chunk \"exposure\" with a number");
 }
 
 Rgb8Image read_png(const std::filesystem::path& path) {
-    PngInput png(path, kMaxSide);
-    Rgb8Image image{png.width(), png.height(), std::vector<std::uint8_t>(png.bytes(PNG_FORMAT_RGB))};
-    png.read(image.rgb.data());
-    return image;
+    PngInput png(path, {.side = kMaxSide});
+    return {png.width(), png.height(), png.rgb()};
 }
 
 }  // namespace nephos

@@ -105,11 +105,6 @@ float tone_map(float radiance) {
     return kShoulder + (1.0f - kShoulder) * (1.0f - std::exp(-(radiance - kShoulder) / (1.0f - kShoulder)));
 }
 
-float encode_srgb(float linear) {
-    const float x = std::clamp(linear, 0.0f, 1.0f);
-    return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1.0f / 2.4f) - 0.055f;
-}
-
 std::array<float, 3> neutral_tone(const std::array<float, 3>& radiance) {
     std::array<float, 3> colour{};
     for (std::size_t c = 0; c < 3; ++c) colour[c] = radiance[c] > 0.0f ? radiance[c] : 0.0f;

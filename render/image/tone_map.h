@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/srgb.h"
 #include "render/image/picture.h"
 #include "render/options/options.h"
 
@@ -24,9 +25,6 @@ float tone_map(float radiance);
 // reflection of a dielectric: here cloud tops of 0.7 to 1.5 shall keep relief, and skies have no such
 // reflection. Negative and NaN give 0. Pure.
 std::array<float, 3> neutral_tone(const std::array<float, 3>& radiance);
-
-// Applies the sRGB transfer function (IEC 61966-2-1): linear 0..1 to encoded 0..1. Pure.
-float encode_srgb(float linear);
 
 // Returns the beauty layer as 8-bit sRGB, 3 bytes a pixel: multiplied by 2^exposure_ev, tone-mapped by the
 // curve, encoded, and rounded with a fixed ordered dither of at most half a step, so that a clear sky has

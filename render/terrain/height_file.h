@@ -4,7 +4,8 @@
 // Height maps from files of other programs, by the ending of their names:
 //
 //     .png          one channel of 16 bits, 0..65535; colour profiles and gamma do not count
-//     .exr          a part with one channel, or one named Z, Y, height or R, of any type: metres
+//     .exr          the first part, with one channel or one named Z, Y, height or R, of any type: metres. Its data window is its
+//                   display window
 //     .raw .r16     rows of unsigned 16-bit numbers, little-endian, without a header
 //
 // All with the north at the top, 2 to 4096 on a side. PNG and EXR are parsed in a confined child process (docs/security.md).

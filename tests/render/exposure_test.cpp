@@ -5,8 +5,12 @@
 
 #include <array>
 #include <cmath>
+#include <fstream>
+#include <iterator>
+#include <limits>
 #include <numeric>
 #include <random>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -64,6 +68,36 @@ TEST(Exposure, IsInThePngFile) {
     EXPECT_EQ(read_png_exposure(file), 0.3 + metered_ev(picture));
     EXPECT_EQ(read_png(file).rgb, to_srgb8(picture, 0.3 + metered_ev(picture)));
     EXPECT_THROW(read_png_exposure(folder.path() / "none.png"), Error);
+}
+
+// A run that goes on takes it over: one digit that is damaged would make all of its pictures darker or brighter.
+TEST(Exposure, OfADamagedFileIsAnError) {
+    const TemporaryFolder folder;
+    RenderOptions options;
+    options.camera.exposure_ev = -0.294;
+    const auto file = folder.path() / "a.png";
+    write_png(file, grey(30, 20, 0.07f), options, {});
+    std::ifstream stream(file, std::ios::binary);
+    const std::string whole((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+    const std::size_t pixels = whole.find("IDAT");
+    ASSERT_NE(pixels, whole.npos);
+    ASSERT_EQ(read_png_exposure(file), -0.294);
+    for (std::size_t n = 0; n + 4 < pixels; ++n) {
+        std::string damaged = whole;
+        damaged[n] = char(damaged[n] ^ 4);
+        std::ofstream(file, std::ios::binary) << damaged;
+        EXPECT_THROW(read_png_exposure(file), Error) << n;
+    }
+}
+
+TEST(Exposure, IsAFiniteNumber) {
+    const TemporaryFolder folder;
+    RenderOptions options;
+    for (const double exposure : {std::numeric_limits<double>::infinity(), std::nan("")}) {
+        options.camera.exposure_ev = exposure;
+        write_png(folder.path() / "a.png", grey(30, 20, 0.07f), options, {});
+        EXPECT_THROW(read_png_exposure(folder.path() / "a.png"), Error);
+    }
 }
 
 // Ratios of channels are kept below the shoulder and in the scaled colour; brighter is never darker; white is

@@ -815,9 +815,9 @@ class Export(Case):
         self.assertLessEqual(abs(found[..., 2].astype(int) - expected).max(), 1)
         self.assertEqual(set(numpy.unique(found[..., 1][found[..., 2] > 0])), {204})  # cumulus
         self.assertEqual(found[..., 0].max(), 0)
-        for name, says in (("placed_0003.voxels.png", "no picture of a cloud"), ("placed_0004.voxels.png", "is no PNG file")):
+        for name, says in (("placed_0003.voxels.png", "no picture of a cloud"), ("placed_0004.voxels.png", "cannot be read as PNG: it ends early")):
             path = folder / name
-            if "no PNG" in says:
+            if "early" in says:
                 path.write_bytes(path.read_bytes()[:100])
             else:
                 Image.new("RGBA", (40, 40)).save(path)

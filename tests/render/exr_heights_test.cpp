@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// Heights of OpenEXR: each compression and type is read, and a chunk that does not give its pixels is damage, whatever memory held.
+
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfTiledOutputFile.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include "core/error.h"
+#include "render/terrain/height_file.h"
+#include "tests/render/temporary_folder.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kColumns = 20, kRows = 70;  // several chunks of each compression but DWAB
+constexpr int kTile = 16;
+
+// Whole numbers that a half holds.
+std::vector<float> heights() {
+    std::vector<float> values;
+    for (int n = 0; n < kColumns * kRows; ++n) values.push_back(float(n / kColumns * 20 + n % kColumns));
+    return values;
+}
+
+Imf::Header header_of(Imf::Compression compression) {
+    Imf::Header header(kColumns, kRows);
+    header.compression() = compression;
+    header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
+    return header;
+}
+
+template <typename File>
+void set_pixels(File& file, const std::vector<float>& values) {
+    Imf::FrameBuffer buffer;
+    buffer.insert("Z", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(values.data())),
+                                  sizeof(float), sizeof(float) * kColumns));
+    file.setFrameBuffer(buffer);
+}
+
+void write_rows(const fs::path& path, const Imf::Header& header) {
+    const std::vector<float> values = heights();
+    Imf::OutputFile file(path.c_str(), header, 0);
+    set_pixels(file, values);
+    file.writePixels(kRows);
+}
+
+void write_tiles(const fs::path& path, Imf::Header header) {
+    const std::vector<float> values = heights();
+    header.setTileDescription(Imf::TileDescription(kTile, kTile, Imf::ONE_LEVEL));
+    Imf::TiledOutputFile file(path.c_str(), header, 0);
+    set_pixels(file, values);
+    file.writeTiles(0, file.numXTiles() - 1, 0, file.numYTiles() - 1);
+}
+
+std::string content(const fs::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+void write(const fs::path& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
+
+std::uint32_t number_at(const std::string& bytes, std::size_t at) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, bytes.data() + at, sizeof value);
+    return value;
+}
+
+// The place of the size of the last chunk: what follows it is the chunk, to the end of the file.
+std::size_t last_size(const std::string& bytes) {
+    for (std::size_t at = bytes.size() - 4; at > 0; --at)
+        if (number_at(bytes, at) == bytes.size() - at - 4 && number_at(bytes, at) > 0) return at;
+    ADD_FAILURE() << "no chunk";
+    return 0;
+}
+
+std::string with_last_chunk(const std::string& bytes, const std::string& chunk) {
+    const auto size = std::uint32_t(chunk.size());
+    return bytes.substr(0, last_size(bytes)) + std::string(reinterpret_cast<const char*>(&size), 4) + chunk;
+}
+
+std::string reason_of(const fs::path& path) {
+    try {
+        read_height_file(path, 0, 0);
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::io);
+        return error.what();
+    }
+    return "";
+}
+
+class ExrHeights : public testing::TestWithParam<Imf::Compression> {
+  protected:
+    fs::path path(const char* name) const { return folder_.path() / name; }
+
+  private:
+    TemporaryFolder folder_;
+};
+
+TEST_P(ExrHeights, AreThoseOfTheFile) {
+    const bool is_exact = GetParam() < Imf::DWAA_COMPRESSION && GetParam() != Imf::PXR24_COMPRESSION;
+    write_rows(path("rows.exr"), header_of(GetParam()));
+    write_tiles(path("tiles.exr"), header_of(GetParam()));
+    for (const char* name : {"rows.exr", "tiles.exr"}) {
+        const std::vector<float> found = read_height_file(path(name), 0, 0).image.heights,
+                                 expected = heights();
+        ASSERT_EQ(found.size(), expected.size());
+        for (std::size_t n = 0; n < found.size(); ++n)
+            EXPECT_NEAR(found[n], expected[n], is_exact ? 0 : 1e-2 * (1 + double(expected[n]))) << name << n;
+    }
+}
+
+TEST_P(ExrHeights, OfAChunkThatLacksSomeAreDamage) {
+    write_rows(path("rows.exr"), header_of(GetParam()));
+    write_tiles(path("tiles.exr"), header_of(GetParam()));
+    for (const char* name : {"rows.exr", "tiles.exr"}) {
+        const std::string whole = content(path(name));
+        const std::string chunk = whole.substr(last_size(whole) + 4);
+        for (const std::size_t size : {std::size_t(0), std::size_t(1), chunk.size() / 2, chunk.size() - 1}) {
+            write(path("damaged.exr"), with_last_chunk(whole, chunk.substr(0, size)));
+            EXPECT_NE(reason_of(path("damaged.exr")).find("damaged.exr: cannot read heights of OpenEXR: "),
+                      std::string::npos)
+                << name << ", " << size << " of " << chunk.size() << ": " << reason_of(path("damaged.exr"));
+        }
+    }
+}
+
+// One bit of the head: the chunks have fewer rows or columns than it says.
+TEST_P(ExrHeights, OfAHeadThatClaimsMoreAreDamage) {
+    write_rows(path("rows.exr"), header_of(GetParam()));
+    write_tiles(path("tiles.exr"), header_of(GetParam()));
+    for (const char* name : {"rows.exr", "tiles.exr"})
+        for (const std::size_t corner :
+             {std::size_t(8), std::size_t(12)}) {  // the larger x or y of a box of four numbers
+            std::string bytes = content(path(name));
+            for (const char* window : {"dataWindow", "displayWindow"}) {
+                const std::size_t at = bytes.find(std::string(window) + '\0' + "box2i");
+                ASSERT_NE(at, bytes.npos);
+                const std::size_t number = at + std::strlen(window) + 1 + 6 + 4 + corner;
+                std::uint32_t value = number_at(bytes, number) + 1;
+                std::memcpy(&bytes[number], &value, sizeof value);
+            }
+            write(path("claims.exr"), bytes);
+            EXPECT_NE(reason_of(path("claims.exr")).find("claims.exr: cannot read heights of OpenEXR: "),
+                      std::string::npos)
+                << name << ", " << corner << ": " << reason_of(path("claims.exr"));
+        }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ExrHeights,
+                         testing::Values(Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION,
+                                         Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION, Imf::PXR24_COMPRESSION,
+                                         Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION, Imf::DWAA_COMPRESSION,
+                                         Imf::DWAB_COMPRESSION));
+
+// What is packed is whole by itself, but too short for the pixels.
+TEST(ExrHeightsOfZip, OfAShortChunkAreDamage) {
+    const TemporaryFolder folder;
+    write_rows(folder.path() / "a.exr", header_of(Imf::ZIP_COMPRESSION));
+    const std::string few(10, '\0');
+    uLongf size = compressBound(few.size());
+    std::string chunk(size, '\0');
+    ASSERT_EQ(compress(reinterpret_cast<Bytef*>(chunk.data()), &size,
+                       reinterpret_cast<const Bytef*>(few.data()), few.size()),
+              Z_OK);
+    chunk.resize(size);
+    write(folder.path() / "short.exr", with_last_chunk(content(folder.path() / "a.exr"), chunk));
+    EXPECT_NE(reason_of(folder.path() / "short.exr").find("cannot read heights of OpenEXR: "),
+              std::string::npos);
+}
+
+// One whose edges a program has cropped would be stretched over the whole map.
+TEST(ExrHeightsOfAWindow, OfAPartOfTheMapAreRefused) {
+    const TemporaryFolder folder;
+    Imf::Header header = header_of(Imf::ZIP_COMPRESSION);
+    header.displayWindow() = Imath::Box2i({0, 0}, {99, 99});
+    write_rows(folder.path() / "crop.exr", header);
+    EXPECT_NE(reason_of(folder.path() / "crop.exr")
+                  .find("its data window is (0 0) to (19 69), its display window (0 0) to (99 99)"),
+              std::string::npos)
+        << reason_of(folder.path() / "crop.exr");
+}
+
+}  // namespace
+}  // namespace nephos
