@@ -56,9 +56,10 @@ struct ListedFile {
 };
 
 // Checks that all files are there and have their size and checksum: two lines, which name the first problems, and one more,
-// which was not done, where the system cannot read some. `extra`: files that are there and should not be.
+// which was not done, where the system cannot read some. `extra`: files that are there and should not be; `is_listed`: whether the
+// folder could be looked through for them.
 std::vector<Check> check_files(const std::filesystem::path& folder, const std::vector<ListedFile>& files,
-                               const std::vector<std::filesystem::path>& extra);
+                               const std::vector<std::filesystem::path>& extra, bool is_listed);
 
 // Checks that the list itself, manifest.json or export.json, is as it was written, by the checksum at its end. Throws
 // Error(io) as open_regular_file().

@@ -269,10 +269,12 @@ CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const Mas
             all = std::move(one);
             continue;
         }
+        const bool have_levels = !one.seen_from_above && !all.seen_from_above;
         if (one.snapshots.front().extent() != all.snapshots.front().extent() ||
-            one.cell_size_m != all.cell_size_m)
+            one.cell_size_m != all.cell_size_m || (have_levels && one.level_height_m != all.level_height_m))
             fail(ErrorCode::usage, path,
-                 "has another number of cells or another cell size than the masks before it");
+                 "has another number of cells, another cell size or another height of levels than the masks "
+                 "before it");
         all.missing += one.missing;
         all.seen_from_above = all.seen_from_above || one.seen_from_above;
         std::ranges::move(one.snapshots, std::back_inserter(all.snapshots));

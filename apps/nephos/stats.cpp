@@ -84,6 +84,9 @@ void print_table(const CloudMasks& masks, const MaskStatistics& found) {
                             masks.snapshots.size() == 1 ? "" : "s", extent.x, extent.y,
                             masks.seen_from_above ? "" : fmt::format(" x {}", extent.z),
                             number_text(masks.cell_size_m)) +
+                (!masks.seen_from_above && masks.level_height_m != masks.cell_size_m
+                     ? fmt::format(", {} m high", number_text(masks.level_height_m))
+                     : "") +
                 (masks.seen_from_above ? ", seen from above" : ""));
     output.line(fmt::format("{:22} {:>11} {:>10}  {}", "statistic", "mean", "se", "what it is"));
     for (std::size_t n = 0; n < kStatistics.size(); ++n) {

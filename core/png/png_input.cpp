@@ -20,8 +20,7 @@ namespace nephos {
 namespace {
 
 constexpr std::size_t kMostBytes = std::size_t(1) << 30;
-// Deflate makes at most 1,032 bytes of one, and a pixel has at least a bit.
-constexpr std::uint64_t kPixelsOfByte = 8 * 1032;
+constexpr std::uint64_t kMostInflated = 1032;  // bytes that deflate makes of one
 constexpr png_uint_32 kMostTexts = 64;
 constexpr png_alloc_size_t kMostText = png_alloc_size_t(1) << 16;  // bytes of each
 constexpr double kPowerOfSrgb = 2.2, kNear = 0.05;  // 1 / gAMA, to that part, means the curve of sRGB
@@ -108,6 +107,7 @@ bool PngInput::Decoder::read_head(bool keep_texts) {
 
 bool PngInput::Decoder::begin_rows() {
     if (setjmp(png_jmpbuf(png)) != 0) return false;
+    png_set_chunk_malloc_max(png, 0);  // what follows the pixels is skipped, however long
     png_set_benign_errors(png, 0);  // more pixels than there are, or another checksum of them, is damage
     if (png_get_color_type(png, info) == PNG_COLOR_TYPE_PALETTE) {
         png_set_packing(png);  // a byte an index
@@ -193,7 +193,8 @@ void PngInput::open(std::span<const std::byte> file, const PngLimits& limits) {
         fail("it is " + claim + "; expected at most " + std::to_string(side) + " on a side" +
              (counts ? " and " + std::to_string(limits.pixels) + " in all" : ""));
     }
-    if (pixels > file.size() * kPixelsOfByte)
+    if (png_get_rowbytes(decoder_->png, decoder_->info) * std::uint64_t(decoder_->height) >
+        file.size() * kMostInflated)
         fail("it is damaged: its head claims " + claim + ", more than " + std::to_string(file.size()) +
              " bytes can hold");
     if (!decoder_->begin_rows()) fail(decoder_->error);

@@ -61,7 +61,8 @@ Points points_of(const openvdb::GridBase& grid, const CoordBBox& box) {
         points.spacing[axis] = to[axis];
         along = std::isfinite(to.length()) && to[axis] > 0;
         for (int other = 0; other < 3; ++other)
-            if (other != axis) beside[other] += std::abs(to[other]) * box.dim()[axis];
+            if (other != axis)
+                beside[other] += std::abs(to[other]) * (double(box.max()[axis]) - box.min()[axis] + 1);
     }
     for (int axis = 0; axis < 3; ++axis) along = along && beside[axis] <= 0.01 * points.spacing[axis];
     if (!along)

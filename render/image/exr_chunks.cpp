@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/image/exr_chunks.h"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <new>
 #include <stdexcept>
 #include <string>
-#include <vector>
+#include <string_view>
 
 #include <OpenEXR/openexr.h>
 #include <unistd.h>
@@ -66,16 +65,22 @@ class Chunks {
     Chunks& operator=(const Chunks&) = delete;
     ~Chunks() { exr_finish(&file_); }
 
-    void require_whole() {
+    // Returns whether all of them were decoded.
+    bool require_whole() {
         exr_storage_t storage{};
         exr_attr_box2i_t window{};
         require(exr_get_storage(file_, 0, &storage));
         require(exr_get_data_window(file_, 0, &window));
         require(exr_get_compression(file_, 0, &compression_));
+        const exr_attr_chlist_t* channels = nullptr;
+        require(exr_get_channels(file_, 0, &channels));
+        for (int c = 0; c < channels->num_channels; ++c)
+            if (channels->entries[c].y_sampling > 2) return false;  // 3.1.5 miscounts their bytes
         if (storage == EXR_STORAGE_TILED)
             require_tiles(window);
         else
             require_rows(window);
+        return !is_dwa();
     }
 
   private:
@@ -83,7 +88,9 @@ class Chunks {
         if (result == EXR_ERR_SUCCESS) return;
         if (source_.failure != 0)
             throw std::runtime_error(std::string("cannot read: ") + std::strerror(source_.failure));
-        if (result == EXR_ERR_OUT_OF_MEMORY && source_.message[0] == '\0') throw std::bad_alloc();
+        // Some decompressors call damage so.
+        const bool is_damage = std::string_view(source_.message).starts_with("Unable to decompress");
+        if (result == EXR_ERR_OUT_OF_MEMORY && !is_damage) throw std::bad_alloc();
         throw std::runtime_error(source_.message[0] != '\0' ? source_.message
                                                             : exr_get_default_error_message(result));
     }
@@ -114,13 +121,11 @@ class Chunks {
 
     void require_pixels(const exr_chunk_info_t& chunk) {
         if (chunk.packed_size == 0) throw std::runtime_error("a chunk of its pixels is empty");
-        if (compression_ == EXR_COMPRESSION_DWAA || compression_ == EXR_COMPRESSION_DWAB) return;
-        if (compression_ == EXR_COMPRESSION_NONE) {
-            if (chunk.packed_size != chunk.unpacked_size)
-                throw std::runtime_error("a chunk of its pixels has " + std::to_string(chunk.packed_size) +
-                                         " bytes; expected " + std::to_string(chunk.unpacked_size));
-            return;
-        }
+        // What does not become smaller is stored as it is, which the core does not know of B44.
+        if (is_dwa() || chunk.packed_size == chunk.unpacked_size) return;
+        if (compression_ == EXR_COMPRESSION_NONE)
+            throw std::runtime_error("a chunk of its pixels has " + std::to_string(chunk.packed_size) +
+                                     " bytes; expected " + std::to_string(chunk.unpacked_size));
         exr_decode_pipeline_t pipeline{};
         require(exr_decoding_initialize(file_, 0, &chunk, &pipeline));
         const exr_result_t result = decode(pipeline);
@@ -128,30 +133,24 @@ class Chunks {
         require(result);
     }
 
+    // Nobody needs the pixels themselves.
     exr_result_t decode(exr_decode_pipeline_t& pipeline) {
-        for (int c = 0; c < pipeline.channel_count; ++c) {
-            exr_coding_channel_info_t& channel = pipeline.channels[c];
-            const auto sample = std::size_t(channel.bytes_per_element);
-            const std::size_t row = sample * std::size_t(channel.width);
-            pixels_.resize(std::max(pixels_.size(), row * std::size_t(channel.height)));
-            channel.decode_to_ptr = c == 0 ? pixels_.data() : nullptr;
-            channel.user_data_type = channel.data_type;
-            channel.user_bytes_per_element = std::int16_t(sample);
-            channel.user_pixel_stride = std::int32_t(sample);
-            channel.user_line_stride = std::int32_t(row);
-        }
         const exr_result_t chosen = exr_decoding_choose_default_routines(file_, 0, &pipeline);
+        pipeline.unpack_and_convert_fn = nullptr;
         return chosen != EXR_ERR_SUCCESS ? chosen : exr_decoding_run(file_, 0, &pipeline);
+    }
+
+    bool is_dwa() const {
+        return compression_ == EXR_COMPRESSION_DWAA || compression_ == EXR_COMPRESSION_DWAB;
     }
 
     Source source_;
     exr_context_t file_ = nullptr;
     exr_compression_t compression_ = EXR_COMPRESSION_NONE;
-    std::vector<std::uint8_t> pixels_;  // of a channel, which nobody looks at
 };
 
 }  // namespace
 
-void require_whole_chunks(int fd) { Chunks(fd).require_whole(); }
+bool decodes_whole_chunks(int fd) { return Chunks(fd).require_whole(); }
 
 }  // namespace nephos

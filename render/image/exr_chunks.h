@@ -6,10 +6,10 @@
 
 namespace nephos {
 
-// Reads each chunk of the first part of an open file, of tiles those of full size, by OpenEXR's core library, which compares
-// what a chunk gives with what its pixels take. OpenEXR's own reader does not (3.1.5): of a chunk of fewer bytes the pixels are
-// what memory held. Chunks of DWA, which that version of the core cannot read, and whose reader makes sure itself, are looked at
-// for their places and sizes alone. Throws std::runtime_error with what is wrong, "cannot read: ..." where a read failed.
-void require_whole_chunks(int fd);
+// Decodes each chunk of the first part of an open file, of tiles those of full size, by OpenEXR's core library, which compares what
+// a chunk gives with what its pixels take. OpenEXR's own reader does not (3.1.5): of a chunk of fewer bytes the pixels are what
+// memory held. Returns false for what that version of the core cannot decode, DWA and channels of less than half the rows. Throws
+// std::runtime_error with what is wrong, "cannot read: ..." where a read failed, std::bad_alloc.
+bool decodes_whole_chunks(int fd);
 
 }  // namespace nephos

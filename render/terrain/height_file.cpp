@@ -98,8 +98,8 @@ bool read_png_rows(PngSource& source, PngHeader& header, std::vector<std::uint16
     volatile bool good = false;
     if (info != nullptr && setjmp(png_jmpbuf(png)) == 0) {
         png_set_user_limits(png, 1'000'000, 1'000'000);
-        png_set_chunk_malloc_max(png, 1u << 20);
-        png_set_chunk_cache_max(png, 64);
+        png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
+        png_set_chunk_malloc_max(png, 0);  // they are skipped, however long
         png_set_read_fn(png, &source, read_png_bytes);
         png_read_info(png, info);
         header.width = png_get_image_width(png, info);

@@ -141,7 +141,8 @@ void Document::set(const std::string& option, KeyForm (*describe)(const std::vec
 
     Node* node = &root;
     std::string reached;
-    for (const PathStep& step : path.steps) {
+    for (std::size_t n = 0; n < path.steps.size(); ++n) {
+        const PathStep& step = path.steps[n];
         const Place place{index, 1, step.column};
         if (!step.name.empty()) {
             if (node->kind != Node::Kind::table) {
@@ -150,6 +151,13 @@ void Document::set(const std::string& option, KeyForm (*describe)(const std::vec
                 return;
             }
             Entry* entry = node->find(step.name);
+            if (entry == nullptr && n + 1 < path.steps.size() && path.steps[n + 1].name.empty()) {
+                report(place,
+                       enclosed(reached + (reached.empty() ? "" : ".") + step.name, '`') +
+                           " is not in the scene",
+                       "expected an array there, of which this changes an item");
+                return;
+            }
             if (entry == nullptr) {
                 node->entries.push_back({step.name, place, {}});
                 entry = &node->entries.back();

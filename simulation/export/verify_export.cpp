@@ -407,7 +407,7 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
             {"complete", false,
              is_empty ? "the export has made nothing yet: it was refused or interrupted"
                       : "the export was interrupted or refused: the same command goes on, or says why not"});
-    for (Check& check : check_files(folder, files, extra)) result.checks.push_back(std::move(check));
+    for (Check& check : check_files(folder, files, extra, true)) result.checks.push_back(std::move(check));
     if (!options.hashes_only) {
         for (Check& check : check_sidecars(folder, list)) result.checks.push_back(std::move(check));
         for (Check& check : check_voxels(folder, list)) result.checks.push_back(std::move(check));

@@ -396,8 +396,11 @@ TEST_F(PngFiles, ChunksOfOthersMayBeLarge) {
     const Kind kind{PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE};
     Source source = source_of(kind);
     std::string file = content(write(kind, source));
-    for (const char* name : {"iCCP", "tEXt", "prVt", "eXIf"})
-        file.insert(33, chunk_of(name, std::string(9 << 20, 'x')));
+    for (const char* name : {"iCCP", "tEXt", "prVt", "eXIf"}) {
+        const std::string chunk = chunk_of(name, std::string(9 << 20, 'x'));
+        file.insert(file.size() - 12, chunk);  // before the end
+        file.insert(33, chunk);                // behind the head
+    }
     EXPECT_EQ(message_of(write(file), kLimits), "");
 }
 

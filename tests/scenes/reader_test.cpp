@@ -260,7 +260,12 @@ TEST(Options, BadPathsAreRefused) {
         EXPECT_TRUE(contains(messages, "expected --set key.path=value")) << messages;
     }
     EXPECT_TRUE(contains(messages_of("seed = 1", {"seed.x=1"}), "`seed` is an integer, it has no keys"));
-    EXPECT_TRUE(contains(messages_of("seed = 1", {"wind[0].time_s=1"}), "`wind` has no item 0"));
+    // And no more than that: no empty `wind`, which would be an error itself.
+    EXPECT_EQ(messages_of("seed = 1", {"wind[0].time_s=1"}).find("error: `wind` is not in the scene"),
+              messages_of("seed = 1", {"wind[0].time_s=1"}).rfind("error: "));
+    EXPECT_TRUE(contains(messages_of("seed = 1", {"field.ellipsoids[0].ext=1"}),
+                         "`field.ellipsoids` is not in the scene"));
+    EXPECT_TRUE(contains(messages_of("seed = 1\nwind = []", {"wind[0].time_s=1"}), "`wind` has no item 0"));
     EXPECT_TRUE(contains(messages_of("[[wind]]\nlevels=[{height_m=0, east_m_per_s=0}]", {"wind[1].time_s=1"}),
                          "it has 1 item, counted from 0"));
 }

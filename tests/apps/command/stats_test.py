@@ -314,6 +314,25 @@ class Stats(Case):
                               env=self.environment, capture_output=True, text=True, check=True).stdout
         self.assertLess(int(most), 400 << 10, "KiB; the file has 64 MiB, its values as doubles 512")
 
+    def test_voxels_of_any_height(self):
+        """Levels of a VDB file are as high as it says, and those of several files as each other's."""
+        import pyopenvdb
+        mask = random_mask(5, (6, 8, 10), 0.3)
+        for name, height in (("high.vdb", 100), ("flat.vdb", 40), ("again.vdb", 40)):
+            grid = pyopenvdb.BoolGrid()
+            grid.name = "cld"
+            grid.copyFromArray(numpy.ascontiguousarray(mask.transpose()).astype(bool))
+            grid.transform = pyopenvdb.createLinearTransform([[100, 0, 0, 0], [0, 100, 0, 0], [0, 0, height, 0], [0, 0, 0, 1]])
+            pyopenvdb.write(str(self.folder / name), grids=[grid])
+        high, flat = (self.stats(name)["statistics"] for name in ("high.vdb", "flat.vdb"))
+        for name in ("cover", "cloud_area_m2", "clouds_per_km2", "cloud_fraction"):
+            self.assertEqual(high[name]["mean"], flat[name]["mean"], name)
+        # Voxels are placed by their centres, so the lowest face is half a height below 0.
+        self.assertAlmostEqual(high["base_mean_m"]["mean"] / 100, flat["base_mean_m"]["mean"] / 40, 9)
+        self.assertIn("cells of 100 m, 40 m high", self.call("stats", "flat.vdb").stdout)
+        self.assertEqual(self.stats("flat.vdb", "again.vdb")["statistics"]["base_mean_m"]["mean"], flat["base_mean_m"]["mean"])
+        self.refused(2, "stats", "flat.vdb", "high.vdb", says="another height of levels than the masks before it")
+
     def test_pictures_whose_head_lies_cost_nothing(self):
         def png(width, height, depth, data):
             def piece(kind, content):
@@ -322,9 +341,9 @@ class Stats(Case):
                     piece(b"IDAT", data) + piece(b"IEND", b""))
         limit = lambda: limit_addresses(2 << 30)
         for width, height, status, says in ((65536, 65536, 3, "at most 65536 on a side and 268435456 in all"),
-                                            (32768, 8193, 3, "32768 x 8193 pixels; at most"),
+                                            (32768, 8193, 3, "32768 x 8193 pixels; expected at most"),
                                             (16384, 16384, 3, "its head claims 16384 x 16384 pixels, more than"),
-                                            (70000, 1, 3, "70000 x 1 pixels; at most")):
+                                            (70000, 1, 3, "70000 x 1 pixels; expected at most")):
             (self.folder / "small.png").write_bytes(png(width, height, 8, zlib.compress(b"\0" * 100)))
             self.assertLess((self.folder / "small.png").stat().st_size, 100)
             self.refused(status, "stats", "small.png", "--cell-size", "5", preexec_fn=limit, says=says)

@@ -96,6 +96,23 @@ class Verify(Case):
             self.assertEqual(said.returncode, 3, said.stdout + said.stderr)
             self.assertIn("cannot be confined", said.stdout + said.stderr)
 
+    def test_what_was_not_read_does_not_agree(self):
+        """Bytes that nobody compared are no part of those that agree."""
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        listed = self.checks("out", "--hashes")["hashes"]["detail"]
+        self.assertRegex(listed, r"^\d+ bytes agree with")
+        files = int(self.checks("out", "--hashes")["files"]["detail"].split()[0])
+        failing = {"LD_PRELOAD": os.environ["FAILING_CALLS"], "FAIL_CALL": "read EIO 1 1000000"}
+        for path, compared in (("statistics.csv", files - 1), (".", 0)):
+            report = json.loads(self.call("verify", "out", "--hashes", "--json", status=3, env={**failing, "FAIL_PATH": path}).stdout or
+                                '{"checks": []}')
+            checks = {check["name"]: check for check in report["checks"]}
+            if compared:
+                bytes_of_table = (self.folder / "out/statistics.csv").stat().st_size
+                self.assertEqual(checks["hashes"]["detail"], f"{int(listed.split()[0]) - bytes_of_table} bytes of {compared} of the files agree "
+                                 "with their checksums")
+            self.assertNotIn("bytes agree", json.dumps(report))
+
     def test_what_is_asked_for_is_done(self):
         self.call("run", self.scene, "--no-render", "--out", "out")
         self.call("export", "out", "--to", "raw", "-o", "volumes")
