@@ -56,6 +56,9 @@ BitPlane plane_of(const Extent& extent, double threshold, Value&& value) {
     return plane;
 }
 
+// Transforms of files lose digits to where they are.
+bool is_near(double a, double b) { return std::abs(a - b) <= 1e-6 * std::max(std::abs(a), std::abs(b)); }
+
 // Limits a mask seen from above: each of its columns is gone over for each random field that the organisation of its clouds is
 // compared with.
 constexpr std::uint64_t kMostColumns = std::uint64_t(1) << 28;
@@ -63,7 +66,8 @@ constexpr std::uint64_t kMostColumns = std::uint64_t(1) << 28;
 CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& options) {
     VdbReadOptions reading;
     reading.grid = options.variable;
-    const LoadedDensity loaded = load_mask(path, reading);
+    const double threshold = options.threshold.value_or(0);
+    const LoadedDensity loaded = load_mask(path, threshold, reading);
     const DensityGrid& grid = loaded.density;
     const double size = grid.placement().cell_size_m;
     if (options.cell_size_m || options.level_height_m)
@@ -82,7 +86,6 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
     CloudMasks masks{
         {}, size, loaded.level_height_m, {grid.placement().origin_m.z}, options.boundaries, false, 0, {}};
     masks.notes = loaded.notes;
-    const double threshold = options.threshold.value_or(0);
     BitPlane& plane = masks.snapshots.emplace_back(extent);
     if (threshold < 0 && loaded.negative > 0)
         fail(ErrorCode::usage, path,
@@ -99,7 +102,7 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
         for (int k = 0; k < block.size[2]; ++k)
             for (int j = 0; j < block.size[1]; ++j)
                 for (int i = 0; i < block.size[0]; ++i)
-                    if (double(block.values[at++]) > threshold)
+                    if (block.values[at++] > 0)
                         plane.set(block.low[0] + i, block.low[1] + j, block.low[2] + k, true);
     });
     return masks;
@@ -269,12 +272,15 @@ CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const Mas
             all = std::move(one);
             continue;
         }
-        const bool have_levels = !one.seen_from_above && !all.seen_from_above;
-        if (one.snapshots.front().extent() != all.snapshots.front().extent() ||
-            one.cell_size_m != all.cell_size_m || (have_levels && one.level_height_m != all.level_height_m))
-            fail(ErrorCode::usage, path,
-                 "has another number of cells, another cell size or another height of levels than the masks "
-                 "before it");
+        const auto require_alike = [&](bool is_alike, const char* what) {
+            if (!is_alike)
+                fail(ErrorCode::usage, path, fmt::format("has another {} than the masks before it", what));
+        };
+        require_alike(one.snapshots.front().extent() == all.snapshots.front().extent(), "number of cells");
+        require_alike(is_near(one.cell_size_m, all.cell_size_m), "cell size");
+        require_alike(
+            one.seen_from_above || all.seen_from_above || is_near(one.level_height_m, all.level_height_m),
+            "height of levels");
         all.missing += one.missing;
         all.seen_from_above = all.seen_from_above || one.seen_from_above;
         std::ranges::move(one.snapshots, std::back_inserter(all.snapshots));

@@ -29,7 +29,7 @@ std::uint8_t byte_of_light(float light) { return std::uint8_t(std::lround(255 * 
 
 }  // namespace
 
-// What libpng has of a file. It reports errors by longjmp(): between setjmp() and its calls nothing has a destructor. The functions
+// Holds what libpng has of a file. It reports errors by longjmp(): between setjmp() and its calls nothing has a destructor. The functions
 // return false where it failed.
 struct PngInput::Decoder {
     std::span<const std::byte> left;  // of the file
@@ -87,7 +87,7 @@ bool PngInput::Decoder::read_head(bool keep_texts) {
     if (setjmp(png_jmpbuf(png)) != 0) return false;
     png_set_read_fn(png, this, take);
     png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
-    // What else may be in a file, profiles and texts that may be packed, is left out.
+    // Leaves out what else may be in a file: profiles, and texts that may be packed.
     constexpr png_byte kKept[] = "gAMA\0sRGB\0tEXt\0zTXt\0iTXt";
     png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_AS_DEFAULT, kKept, keep_texts ? 5 : 2);
@@ -134,7 +134,7 @@ void PngInput::Decoder::take_palette() {
                                    n < count ? alpha[n] : png_byte(255)};
 }
 
-// Of an interlaced picture each row is read once a pass, into what was read of it.
+// Reads a row; of an interlaced picture once a pass, into what was read of it.
 bool PngInput::Decoder::read_row(std::uint8_t* row) {
     if (setjmp(png_jmpbuf(png)) != 0) return false;
     png_read_row(png, row, nullptr);
@@ -218,7 +218,7 @@ std::optional<std::string> PngInput::text(const std::string& keyword) const {
     return std::nullopt;
 }
 
-// Of an interlaced picture all rows are read in each pass, and used after the last one.
+// Reads all rows of an interlaced picture in each pass, and uses them after the last one.
 template <typename Use>
 void PngInput::read_rows(Use&& use) {
     Decoder& d = *decoder_;

@@ -21,7 +21,7 @@
 
 namespace nephos {
 
-// What is accepted of a picture.
+// Limits what is accepted of a picture.
 struct PngLimits {
     int side = std::numeric_limits<int>::max();  // pixels of the longer one; libpng takes a million
     std::uint64_t pixels = std::numeric_limits<std::uint64_t>::max();
@@ -43,7 +43,7 @@ class PngInput {
     int height() const;
     bool has_alpha() const;
     bool is_interlaced() const;
-    // Of the pixels as they are stored: 1 grey, 2 grey and alpha, 3 red, green and blue, 4 these and alpha, a palette's as 3 or 4.
+    // Returns how many samples a pixel has as it is stored: 1 grey, 2 grey and alpha, 3 red, green and blue, 4 these and alpha, a palette's as 3 or 4.
     int channels() const;
     int bits() const;  // of a sample, 16, or 8 for 8 and fewer
     // The text of that keyword in the chunks before the pixels; nothing without PngLimits::texts.
@@ -54,7 +54,7 @@ class PngInput {
     std::vector<std::uint8_t> rgb();               // three a pixel, sRGB
     std::vector<std::byte> samples();              // as stored, 16 bits in this machine's order
     std::vector<std::uint16_t> luminance_alpha();  // two a pixel, of 65,535: linear light times alpha, alpha
-    // Whether the file goes on behind the picture that has been decoded.
+    // Returns whether the file goes on behind the picture that has been decoded.
     bool goes_on() const;
 
   private:

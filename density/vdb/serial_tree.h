@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <exception>
 #include <memory>
+#include <type_traits>
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Count.h>
@@ -38,6 +39,10 @@ template <class Tree>
 std::uint64_t count_active(const Tree& tree) {
     return openvdb::tools::countActiveVoxels(tree, false);
 }
+
+// Tells trees whose voxels have no value but that they are active. Their tiles store one all the same, which says nothing.
+template <typename Tree>
+constexpr bool kIsActivityAlone = std::is_same_v<typename Tree::BuildType, openvdb::ValueMask>;
 
 // A voxel of the result.
 struct FloatVoxel {

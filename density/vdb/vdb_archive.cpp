@@ -200,6 +200,14 @@ void VdbArchive::read_sequence(std::int32_t count) {
     }
 }
 
+std::string VdbArchive::names() const {
+    std::string names;
+    for (const Entry& entry : entries_)
+        names += (names.empty() ? "`" : ", `") + entry.descriptor.gridName() + "` (" +
+                 entry.header->valueType() + ")";
+    return names.empty() ? "none" : names;
+}
+
 GridBase::Ptr VdbArchive::read(std::size_t n) {
     if (!sequence_.empty()) return sequence_.at(n);
     buffer_.read_below(__builtin_frame_address(0));

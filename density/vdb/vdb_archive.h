@@ -63,6 +63,8 @@ class VdbArchive : public openvdb::io::Archive {
     };
     const std::vector<Entry>& entries() const { return entries_; }
     const openvdb::MetaMap& metadata() const { return metadata_; }
+    // Returns the names of the grids and the types of their values, for messages: "`density` (float), `cld` (bool)", or "none".
+    std::string names() const;
 
     // Reads and returns grid `n` of entries() with its voxels.
     openvdb::GridBase::Ptr read(std::size_t n);

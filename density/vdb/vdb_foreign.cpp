@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
@@ -290,6 +291,11 @@ class Skewed {
         }
     }
 
+    static bool has_cloud(const FloatLeaf& leaf) {
+        return std::ranges::any_of(std::span(leaf.buffer().data(), kBlockVoxels),
+                                   [](float value) { return value > 0; });
+    }
+
     // Our blocks that a leaf or tile of the file reaches, each once, in block order. Throws std::runtime_error where their
     // voxels take more than is allowed, before any is sampled.
     std::vector<Coord> blocks() const {
@@ -328,10 +334,12 @@ class Skewed {
                     " in all, take more than the memory that is allowed");
         };
         const FloatTree& tree = foreign_.grid->tree();
-        for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) add(leaf->getNodeBoundingBox());
+        for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+            if (!foreign_.is_mask || has_cloud(*leaf)) add(leaf->getNodeBoundingBox());
         auto tile = tree.cbeginValueOn();
         tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
-        for (; tile; ++tile) add(tile.getBoundingBox());
+        for (; tile; ++tile)
+            if (!foreign_.is_mask || *tile > 0) add(tile.getBoundingBox());
         keep_each_once();
         return result;
     }
@@ -349,7 +357,10 @@ ForeignResult convert_foreign(const ForeignGrid& foreign, const DensityReceiver&
     const Affine affine = affine_of(foreign);
     AxisMap map;
     const bool are_along = axis_map_of(affine, map) && map.are_alike(0, 1);
-    if (!are_along || !(foreign.is_mask || map.are_alike(0, 2))) return Skewed(foreign, affine).run(receiver);
+    const bool are_cubes = are_along && map.are_alike(0, 2);
+    if (!are_cubes && !(are_along && foreign.is_mask)) return Skewed(foreign, affine).run(receiver);
+    map.edge[1] = map.edge[0];  // but for rounding
+    if (are_cubes) map.edge[2] = map.edge[0];
     std::array<double, 3> size{};
     Vec3d low = affine(foreign.bounds.min().asVec3d());
     low = openvdb::math::minComponent(low, affine(foreign.bounds.max().asVec3d()));

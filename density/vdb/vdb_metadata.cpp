@@ -4,8 +4,10 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
 
 #include "core/text.h"
+#include "density/metaballs.h"
 
 namespace nephos {
 
@@ -118,6 +120,13 @@ std::optional<VdbMetadata> from_meta_map(const openvdb::MetaMap& map) {
     place.start_utc = meta_value<std::string>(map, kMetaStart).value_or("");
     if (!place.start_utc.empty() && !utc_seconds(place.start_utc)) place.start_utc.clear();
     return metadata;
+}
+
+int refine_of(const openvdb::MetaMap& grid) {
+    const int refine = meta_value<int>(grid, kMetaRefine).value_or(1);
+    if (refine < 1 || refine > kMaxRefine)
+        throw std::runtime_error("it is damaged: nephos_refine is out of range");
+    return refine;
 }
 
 }  // namespace nephos

@@ -57,4 +57,7 @@ std::optional<T> meta_value(const openvdb::MetaMap& map, const char* name) {
     return typed ? std::optional<T>(typed->value()) : std::nullopt;
 }
 
+// Returns how many voxels of a grid are a cell along each axis: 1 unless it says more. Throws std::runtime_error where that is out of range.
+int refine_of(const openvdb::MetaMap& grid);
+
 }  // namespace nephos

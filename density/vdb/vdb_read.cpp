@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Density and states from OpenVDB files.
+// Densities and masks from OpenVDB files.
 
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <optional>
 #include <stdexcept>
-#include <type_traits>
 
 #include <openvdb/openvdb.h>
 
@@ -39,15 +39,6 @@ bool is_fog(const openvdb::GridBase& grid) {
            grid.getGridClass() != openvdb::GRID_LEVEL_SET;
 }
 
-std::string names_of(const VdbArchive& archive) {
-    std::string names;
-    for (const auto& entry : archive.entries()) {
-        names += (names.empty() ? "`" : ", `") + entry.descriptor.gridName() + "` (" +
-                 entry.header->valueType() + ")";
-    }
-    return names.empty() ? "none" : names;
-}
-
 bool is_mask(const openvdb::GridBase& grid) { return is<BoolGrid>(grid) || is<openvdb::MaskGrid>(grid); }
 
 std::size_t choose_grid(const VdbArchive& archive, const std::string& requested, bool masks) {
@@ -68,12 +59,12 @@ std::size_t choose_grid(const VdbArchive& archive, const std::string& requested,
         n = find([&](const auto& e) { return e.descriptor.gridName() == name; });
         throw std::runtime_error(n < entries.size()
                                      ? "grid `" + name + "` is not a float fog volume"
-                                     : "there is no grid `" + name + "`; it has " + names_of(archive));
+                                     : "there is no grid `" + name + "`; it has " + archive.names());
     }
     n = find([](const auto& e) { return is_fog(*e.header); });
     if (n == entries.size() && masks) n = find([](const auto& e) { return is_mask(*e.header); });
     if (n == entries.size())
-        throw std::runtime_error("there is no float fog volume in it; it has " + names_of(archive));
+        throw std::runtime_error("there is no float fog volume in it; it has " + archive.names());
     return n;
 }
 
@@ -101,10 +92,6 @@ FloatGrid::Ptr float_grid(const openvdb::GridBase& grid, const FloatTree::Ptr& t
     return result;
 }
 
-// Whether the voxels of a tree have no value but that they are active. Its tiles store one all the same, which says nothing.
-template <typename Tree>
-constexpr bool kIsActivityAlone = std::is_same_v<typename Tree::BuildType, openvdb::ValueMask>;
-
 // 1 where a voxel of a mask is active, and true where it has a value.
 template <typename Grid>
 FloatGrid::Ptr mask_as_float(const Grid& mask) {
@@ -115,7 +102,39 @@ FloatGrid::Ptr mask_as_float(const Grid& mask) {
                       }));
 }
 
-FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
+// Tells whether a voxel is cloud. Throws where it is no number.
+bool is_above(double value, bool is_active, double threshold) {
+    if (is_active && !std::isfinite(value))
+        throw std::runtime_error("it has a density that is not a finite number");
+    return is_active && value > threshold;
+}
+
+// Makes 1 of active values above the threshold, and 0 of all others, in place.
+FloatGrid::Ptr marked_above(const FloatGrid::Ptr& grid, double threshold) {
+    FloatTree& tree = grid->tree();
+    auto tile = tree.beginValueAll();
+    tile.setMaxDepth(FloatTree::ValueAllIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) tile.setValue(is_above(double(*tile), tile.isValueOn(), threshold) ? 1.0f : 0.0f);
+    for (auto leaf = tree.beginLeaf(); leaf; ++leaf)
+        for (openvdb::Index n = 0; n < FloatLeaf::SIZE; ++n)
+            leaf->setValueOnly(
+                n, is_above(double(leaf->getValue(n)), leaf->isValueOn(n), threshold) ? 1.0f : 0.0f);
+    return grid;
+}
+
+FloatGrid::Ptr marked_above(const openvdb::DoubleGrid& grid, double threshold) {
+    return float_grid(grid,
+                      float_tree(grid.tree(), float(grid.background()), [&](double value, bool is_active) {
+                          return FloatVoxel{is_above(value, is_active, threshold) ? 1.0f : 0.0f, is_active};
+                      }));
+}
+
+FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid, std::optional<double> threshold) {
+    if (threshold && *threshold >= 0) {
+        if (const auto typed = openvdb::gridPtrCast<FloatGrid>(grid)) return marked_above(typed, *threshold);
+        if (const auto typed = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid))
+            return marked_above(*typed, *threshold);
+    }
     if (const auto typed = openvdb::gridPtrCast<FloatGrid>(grid)) return typed;
     if (const auto mask = openvdb::gridPtrCast<BoolGrid>(grid)) return mask_as_float(*mask);
     if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) return mask_as_float(*mask);
@@ -146,13 +165,6 @@ bool has_y_up(const openvdb::GridBase& header, const openvdb::MetaMap& file, UpA
     auto stated = meta_value<std::string>(header, kMetaUpAxis);
     if (!stated) stated = meta_value<std::string>(file, kMetaUpAxis);
     return stated == "y";
-}
-
-int refine_of(const openvdb::GridBase& header) {
-    const int refine = meta_value<int>(header, kMetaRefine).value_or(1);
-    if (refine < 1 || refine > kMaxRefine)
-        throw std::runtime_error("it is damaged: nephos_refine is out of range");
-    return refine;
 }
 
 void send_metadata(SandboxWriter& writer, const std::optional<VdbMetadata>& metadata) {
@@ -226,12 +238,13 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
 }
 
 // The child's part: sends header, geometry, blocks and counts.
-void send_density(VdbArchive& archive, const VdbReadOptions& options, bool masks, std::size_t memory_bytes,
-                  SandboxWriter& writer) {
+void send_density(VdbArchive& archive, const VdbReadOptions& options, std::optional<double> threshold,
+                  std::size_t memory_bytes, SandboxWriter& writer) {
+    const bool masks = threshold.has_value();
     const std::size_t n = choose_grid(archive, options.grid, masks);
     const openvdb::GridBase& header = *archive.entries()[n].header;
     check_stated_size(header, memory_bytes);
-    const auto grid = as_float(archive.read(n));
+    const auto grid = as_float(archive.read(n), threshold);
     if (grid->background() != 0.0f) {
         throw std::runtime_error("its background is " + number_text(grid->background(), 6) +
                                  ", not 0: it is no fog volume");
@@ -294,168 +307,22 @@ LoadedDensity receive_density(SandboxReader& reader, bool list_grids) {
     return loaded;
 }
 
-// In the child: the blocks of one bool or mask tree.
-template <class Tree>
-void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& name, SandboxWriter& writer) {
-    if (tree.background()) throw std::runtime_error("the background of grid `" + name + "` is true");
-    CoordBBox active;
-    if (tree.evalActiveVoxelBoundingBox(active) && !allowed.isInside(active)) {
-        throw std::runtime_error("grid `" + name + "` has voxels outside the " +
-                                 std::to_string(allowed.dim().x()) + " x " +
-                                 std::to_string(allowed.dim().y()) + " x " +
-                                 std::to_string(allowed.dim().z()) + " voxels of the scene");
-    }
-    const auto send = [&](const Coord& origin, const std::uint64_t(&words)[8]) {
-        writer.value(Record::leaf);
-        for (int a = 0; a < 3; ++a) writer.value(std::int32_t(origin[a]));
-        writer.bytes(words, sizeof words);
-    };
-    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
-        std::uint64_t words[8] = {};
-        for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) {
-            if (*voxel || kIsActivityAlone<Tree>)
-                words[voxel.pos() >> 6] |= std::uint64_t{1} << (voxel.pos() & 63);
-        }
-        if (std::ranges::any_of(words, [](std::uint64_t word) { return word != 0; }))
-            send(leaf->origin(), words);
-    }
-    std::uint64_t full[8];
-    std::fill_n(full, 8, ~std::uint64_t{0});
-    auto tile = tree.cbeginValueOn();
-    tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) {
-        if (!*tile && !kIsActivityAlone<Tree>) continue;
-        const CoordBBox box = tile.getBoundingBox();
-        for (int z = box.min().z(); z <= box.max().z(); z += kBlock) {
-            for (int y = box.min().y(); y <= box.max().y(); y += kBlock) {
-                for (int x = box.min().x(); x <= box.max().x(); x += kBlock) send({x, y, z}, full);
-            }
-        }
-    }
-    send_end(writer);
-}
-
-constexpr const char* kStateGrids[] = {"hum", "act", "cld"};
-
-// Checks the extent of a state by nephos_bbox_max. Without it the extent is unknown, and only voxels outside
-// of `extent` are errors.
-void check_state_extent(const openvdb::GridBase& header, int refine, const Extent& extent) {
-    const auto last = meta_value<openvdb::Vec3i>(header, kMetaBoxMax);
-    if (!last) return;
-    const auto cells = [&](int axis) { return (std::int64_t{(*last)[axis]} + 1) / refine; };
-    if (cells(0) == extent.x && cells(1) == extent.y && cells(2) == extent.z) return;
-    const auto text = [](std::int64_t x, std::int64_t y, std::int64_t z) {
-        return std::to_string(x) + " x " + std::to_string(y) + " x " + std::to_string(z);
-    };
-    throw std::runtime_error("it holds a state of " + text(cells(0), cells(1), cells(2)) +
-                             " cells, but the scene has " + text(extent.x, extent.y, extent.z));
-}
-
-std::string point_text(const openvdb::Vec3d& p) {
-    return "(" + number_text(p.x(), 9) + ", " + number_text(p.y(), 9) + ", " + number_text(p.z(), 9) + ") m";
-}
-
-// Compares where the grid puts the corners of the box of cells with where the scene has them.
-void check_state_placement(const openvdb::GridBase& header, const std::string& name, int refine,
-                           const Extent& extent, const Placement& placement) {
-    const openvdb::math::Transform& transform = header.transform();
-    const bool own = meta_value<openvdb::Vec3i>(header, kMetaBoxMax).has_value();
-    if (!own && transform.isIdentity()) return;
-    const double cell = placement.cell_size_m, tolerance_m = cell / 100;
-    const Vec3& origin = placement.origin_m;
-    const openvdb::Vec3d size = transform.voxelSize() * refine;
-    const double cells[3] = {double(extent.x), double(extent.y), double(extent.z)};
-    for (int axis = 0; axis < 3; ++axis) {
-        if (std::abs(size[axis] - cell) * cells[axis] <= tolerance_m) continue;
-        throw std::runtime_error("grid `" + name + "` has cells of " + number_text(size[axis], 9) +
-                                 " m, but the scene's lattice has cells of " + number_text(cell, 9) + " m");
-    }
-    // An index is a voxel's centre, so the lowest corner of the box has the indices -1/2.
-    const auto corner = [&](double x, double y, double z) {
-        return transform.indexToWorld(openvdb::Vec3d(x, y, z) * refine - openvdb::Vec3d(0.5));
-    };
-    const openvdb::Vec3d low = corner(0, 0, 0), expected(origin.x, origin.y, origin.z);
-    const auto agree = [&](const openvdb::Vec3d& a, const openvdb::Vec3d& b) {
-        return (a - b).length() <= tolerance_m;
-    };
-    if (!agree(low, expected)) {
-        throw std::runtime_error("grid `" + name + "` starts at " + point_text(low) +
-                                 ", but the scene's lattice at " + point_text(expected));
-    }
-    for (int axis = 0; axis < 3; ++axis) {
-        openvdb::Vec3d end(0.0);
-        end[axis] = cells[axis];
-        const openvdb::Vec3d found = corner(end.x(), end.y(), end.z());
-        if (agree(found, expected + end * cell)) continue;
-        throw std::runtime_error("the axes of grid `" + name + "` are turned: its corner at " +
-                                 point_text(found) + " stands at " + point_text(expected + end * cell) +
-                                 " in the scene");
-    }
-}
-
-void send_state(VdbArchive& archive, Extent extent, const Placement& placement, SandboxWriter& writer) {
-    for (const char* name : kStateGrids) {
-        const auto& entries = archive.entries();
-        const auto entry =
-            std::ranges::find_if(entries, [&](const auto& e) { return e.descriptor.gridName() == name; });
-        if (entry == entries.end()) {
-            throw std::runtime_error(std::string("there is no grid `") + name +
-                                     "`; a state needs hum, act and cld; it has " + names_of(archive));
-        }
-        const int refine = refine_of(*entry->header);
-        check_state_extent(*entry->header, refine, extent);
-        check_state_placement(*entry->header, name, refine, extent, placement);
-        writer.value(refine);
-        const Coord last(extent.x * refine - 1, extent.y * refine - 1, extent.z * refine - 1);
-        const auto grid = archive.read(std::size_t(entry - entries.begin()));
-        if (const auto bits = openvdb::gridPtrCast<BoolGrid>(grid)) {
-            send_bits(bits->tree(), {Coord(0), last}, name, writer);
-        } else if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) {
-            send_bits(mask->tree(), {Coord(0), last}, name, writer);
-        } else {
-            throw std::runtime_error(std::string("grid `") + name + "` is of type " + grid->valueType() +
-                                     ", not bool");
-        }
-    }
-}
-
-void receive_plane(SandboxReader& reader, BitPlane& plane) {
-    const Extent extent = plane.extent();
-    const int refine = reader.value<int>();
-    if (refine < 1 || refine > kMaxRefine)
-        throw std::runtime_error("the reading process sent an impossible refinement");
-    const Extent voxels{extent.x * refine, extent.y * refine, extent.z * refine};
-    while (reader.value<Record>() != Record::end) {
-        const Coord origin = receive_origin(reader, voxels);
-        std::uint64_t words[8];
-        reader.bytes(words, sizeof words);
-        for (int n = 0; n < kBlockVoxels; ++n) {
-            if ((words[n >> 6] >> (n & 63) & 1) == 0) continue;
-            const Coord v = origin + Coord(n >> 6, n >> 3 & 7, n & 7);
-            if (v.x() >= voxels.x || v.y() >= voxels.y || v.z() >= voxels.z) {
-                throw std::runtime_error("the reading process sent a misplaced voxel");
-            }
-            if (v.x() % refine == 0 && v.y() % refine == 0 && v.z() % refine == 0) {
-                plane.set(v.x() / refine, v.y() / refine, v.z() / refine, true);
-            }
-        }
-    }
-}
-
 void check_options(const VdbReadOptions& options) {
     if (options.metres_per_unit > 0 && std::isfinite(options.metres_per_unit)) return;
     throw Error(ErrorCode::usage,
                 number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
 }
 
-LoadedDensity load(const std::filesystem::path& path, const VdbReadOptions& options, bool masks) {
+// With a threshold: a mask.
+LoadedDensity load(const std::filesystem::path& path, const VdbReadOptions& options,
+                   std::optional<double> threshold) {
     check_options(options);
     LoadedDensity loaded;
     const std::size_t memory_bytes = memory_limit(options.limits);  // here: the child cannot ask the system
     in_sandbox(
         path, options.limits,
         [&](VdbArchive& archive, SandboxWriter& writer) {
-            send_density(archive, options, masks, memory_bytes, writer);
+            send_density(archive, options, threshold, memory_bytes, writer);
         },
         [&](SandboxReader& reader) { loaded = receive_density(reader, options.list_grids); });
     return loaded;
@@ -464,11 +331,11 @@ LoadedDensity load(const std::filesystem::path& path, const VdbReadOptions& opti
 }  // namespace
 
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options) {
-    return load(path, options, false);
+    return load(path, options, std::nullopt);
 }
 
-LoadedDensity load_mask(const std::filesystem::path& path, const VdbReadOptions& options) {
-    return load(path, options, true);
+LoadedDensity load_mask(const std::filesystem::path& path, double threshold, const VdbReadOptions& options) {
+    return load(path, options, threshold);
 }
 
 void load_densities(std::span<const std::filesystem::path> paths, const VdbReadOptions& options,
@@ -481,7 +348,7 @@ void load_densities(std::span<const std::filesystem::path> paths, const VdbReadO
             in_sandbox(
                 paths.subspan(first, std::min(kMostFilesOfAChild, paths.size() - first)), options.limits,
                 [&](VdbArchive& archive, SandboxWriter& writer) {
-                    send_density(archive, options, false, memory_bytes, writer);
+                    send_density(archive, options, std::nullopt, memory_bytes, writer);
                 },
                 [&](SandboxReader& reader, std::size_t n) {
                     if (!each(first + n, receive_density(reader, options.list_grids))) throw Stopped();
@@ -493,19 +360,6 @@ void load_densities(std::span<const std::filesystem::path> paths, const VdbReadO
 
 DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options) {
     return load_density(path, options).density;
-}
-
-Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
-                   const VdbReadLimits& limits) {
-    Lattice lattice;
-    in_sandbox(
-        path, limits,
-        [&](VdbArchive& archive, SandboxWriter& writer) { send_state(archive, extent, placement, writer); },
-        [&](SandboxReader& reader) {
-            lattice = {BitPlane(extent), BitPlane(extent), BitPlane(extent)};
-            for (BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) receive_plane(reader, *plane);
-        });
-    return lattice;
 }
 
 }  // namespace nephos

@@ -25,21 +25,18 @@ bool fits(const openvdb::GridBase& grid, int parts) {
 
 std::size_t chosen_grid(const VdbArchive& archive, const std::string& name, int parts) {
     const auto& entries = archive.entries();
-    std::string names;
     std::size_t found = entries.size(), count = 0;
     for (std::size_t n = 0; n < entries.size(); ++n) {
         const std::string grid = entries[n].descriptor.gridName();
-        names += (names.empty() ? "`" : ", `") + grid + "` (" + entries[n].header->valueType() + ")";
         if (!fits(*entries[n].header, parts) || (!name.empty() && grid != name)) continue;
         if (++count == 1) found = n;
     }
     if (count == 1) return found;
     const std::string kind = parts == 1 ? "float grid" : "vec3s grid";
-    throw std::runtime_error((count > 1 ? "there are several " + kind + "s in it: name one of"
-                              : name.empty()
-                                  ? "there is no " + kind + " in it; it has"
-                                  : "there is no " + kind + " `" + name + "` in it; it has") +
-                             std::string(" ") + (names.empty() ? "none" : names));
+    throw std::runtime_error((count > 1      ? "there are several " + kind + "s in it: name one of"
+                              : name.empty() ? "there is no " + kind + " in it; it has"
+                                             : "there is no " + kind + " `" + name + "` in it; it has") +
+                             std::string(" ") + archive.names());
 }
 
 // The grid's points along the world's axes, in their order.

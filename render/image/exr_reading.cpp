@@ -3,7 +3,6 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <locale>
 #include <new>
 #include <sstream>
@@ -28,10 +27,8 @@
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfRationalAttribute.h>
 #include <OpenEXR/ImfStringAttribute.h>
-#include <OpenEXR/ImfTiledInputPart.h>
 #include <OpenEXR/ImfVecAttribute.h>
 #include <fcntl.h>
-#include <malloc.h>
 #include <unistd.h>
 
 #include "core/descriptor.h"
@@ -223,84 +220,6 @@ ExrPart received(SandboxReader& reader) {
     return part;
 }
 
-int rows_of_chunk(Imf::Compression compression) {
-    switch (compression) {
-        case Imf::ZIP_COMPRESSION:
-        case Imf::PXR24_COMPRESSION:
-            return 16;
-        case Imf::PIZ_COMPRESSION:
-        case Imf::B44_COMPRESSION:
-        case Imf::B44A_COMPRESSION:
-        case Imf::DWAA_COMPRESSION:
-            return 32;
-        case Imf::DWAB_COMPRESSION:
-            return 256;
-        default:
-            return 1;
-    }
-}
-
-// Decodes the channel of the first part into the pixels of its data window: those of its chunks from `first` to before `last`, in
-// this order or the other. Returns how many chunks there are.
-int read_chunks(int fd, const std::string& channel, int first, int last, bool backwards,
-                std::vector<float>& pixels) {
-    OpenFile stream(fd, "heights");
-    Imf::MultiPartInputFile file(stream, 0);  // no threads
-    const Imf::Header& header = file.header(0);
-    const Imath::Box2i window = header.dataWindow();
-    const int columns = window.max.x - window.min.x + 1, rows = window.max.y - window.min.y + 1;
-    pixels.resize(std::size_t(columns) * std::size_t(rows));
-    Imf::FrameBuffer buffer;
-    buffer.insert(channel, Imf::Slice::Make(Imf::FLOAT, pixels.data(), window, sizeof(float),
-                                            sizeof(float) * std::size_t(columns)));
-    const auto each = [&](int count, const auto& read) {
-        const int end = std::min(last, count);
-        for (int n = first; n < end; ++n) read(backwards ? end - 1 - (n - first) : n);
-        return count;
-    };
-    if (header.hasTileDescription()) {
-        Imf::TiledInputPart part(file, 0);
-        part.setFrameBuffer(buffer);
-        const int across = part.numXTiles(0);
-        return each(across * part.numYTiles(0), [&](int n) { part.readTile(n % across, n / across); });
-    }
-    Imf::InputPart part(file, 0);
-    part.setFrameBuffer(buffer);
-    const int step = rows_of_chunk(header.compression());
-    return each((rows + step - 1) / step, [&](int n) {
-        const int top = window.min.y + n * step;
-        part.readPixels(top, std::min(top + step - 1, window.max.y));
-    });
-}
-
-constexpr int kAll = std::numeric_limits<int>::max();
-
-// Of chunks of which nobody knows whether they give all of their pixels: what they leave out is what memory held, and in other
-// memory makes other pixels. A file opened anew has no chunk before it in memory; of more than some thousand chunks, which would
-// take minutes, several share one, in two orders.
-std::vector<float> pixels_compared(int fd, const std::string& channel) {
-    constexpr int kMostOpened = 4096;
-    std::vector<float> once, again;
-    const int count = read_chunks(fd, channel, 0, 0, false, once);
-    const int share = (count + kMostOpened - 1) / kMostOpened;
-    for (int first = 0; first < count; first += share) {
-        ::mallopt(M_PERTURB, 0x55);
-        read_chunks(fd, channel, first, first + share, false, once);
-        ::mallopt(M_PERTURB, 0x2A);
-        read_chunks(fd, channel, first, first + share, true, again);
-    }
-    if (std::memcmp(once.data(), again.data(), sizeof(float) * once.size()) != 0)
-        throw std::runtime_error("a chunk does not give all of its pixels");
-    return once;
-}
-
-std::vector<float> pixels_of(int fd, const std::string& channel) {
-    if (!decodes_whole_chunks(fd)) return pixels_compared(fd, channel);
-    std::vector<float> pixels;
-    read_chunks(fd, channel, 0, kAll, false, pixels);
-    return pixels;
-}
-
 }  // namespace
 
 void prepare_exr() { Imf::staticInitialize(); }
@@ -338,7 +257,16 @@ ExrGrid parse_exr_grid(int fd, int most) {
             throw std::runtime_error("its channels are " + all + "; expected one alone, or one named Z, Y, height or R");
         if (channel->xSampling != 1 || channel->ySampling != 1)
             throw std::runtime_error("its channel " + name + " has fewer samples than pixels");
-        return {int(columns), int(rows), pixels_of(fd, name)};
+        require_whole_chunks(fd);
+        ExrGrid grid{int(columns), int(rows), {}};
+        grid.values.resize(std::size_t(columns) * std::size_t(rows));
+        const std::size_t row = sizeof(float) * std::size_t(columns);
+        Imf::FrameBuffer buffer;
+        buffer.insert(name, Imf::Slice::Make(Imf::FLOAT, grid.values.data(), window, sizeof(float), row));
+        Imf::InputPart part(file, 0);
+        part.setFrameBuffer(buffer);
+        part.readPixels(window.min.y, window.max.y);
+        return grid;
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& reason) {

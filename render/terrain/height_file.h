@@ -5,7 +5,7 @@
 //
 //     .png          one channel of 16 bits, 0..65535; colour profiles and gamma do not count
 //     .exr          the first part, with one channel or one named Z, Y, height or R, of any type: metres. Its data window is its
-//                   display window
+//                   display window; compressed in any way but by DWA
 //     .raw .r16     rows of unsigned 16-bit numbers, little-endian, without a header
 //
 // All with the north at the top, 2 to 4096 on a side. PNG and EXR are parsed in a confined child process (docs/security.md).

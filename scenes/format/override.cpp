@@ -151,7 +151,10 @@ void Document::set(const std::string& option, KeyForm (*describe)(const std::vec
                 return;
             }
             Entry* entry = node->find(step.name);
-            if (entry == nullptr && n + 1 < path.steps.size() && path.steps[n + 1].name.empty()) {
+            const bool wants_item = n + 1 < path.steps.size() && path.steps[n + 1].name.empty();
+            if (entry == nullptr && wants_item &&
+                describe(names_on({{path.steps.begin(), path.steps.begin() + std::ptrdiff_t(n) + 1}}))
+                    .is_array) {
                 report(place,
                        enclosed(reached + (reached.empty() ? "" : ".") + step.name, '`') +
                            " is not in the scene",

@@ -153,7 +153,7 @@ class SceneReader {
 KeyForm describe(const std::vector<std::string>& path) {
     const Key* key = find_key(path);
     if (key == nullptr) return {};
-    return {takes_text(*key), expected_text(*key)};
+    return {takes_text(*key), expected_text(*key), key->kind == KeyKind::tables};
 }
 
 bool sets_model_files(std::string_view option) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cloud masks of VDB files: which voxels are cloud, whatever their type, and where they are, whatever their shape.
 
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/Prune.h>
@@ -71,9 +73,28 @@ TEST(VdbMask, OfAFogVolumeAreItsVoxels) {
     write_with_openvdb(folder / "fog.vdb", {fog});
     VdbReadOptions options;
     options.grid = "cld";
-    const LoadedDensity loaded = load_mask(folder / "fog.vdb", options);
+    const LoadedDensity loaded = load_mask(folder / "fog.vdb", 0, options);
     expect_voxels_of_the_file(loaded.density);
     EXPECT_DOUBLE_EQ(loaded.level_height_m, 20);
+}
+
+// A double of 0.1 is not above 0.1, though the nearest float is; and 1e300 is a number.
+TEST(VdbMask, DoublesAreComparedAsTheyAre) {
+    const TemporaryFolder folder;
+    const auto fog = grid_of<openvdb::DoubleGrid>({50, 50, 50});
+    const std::array<double, 5> values{0.1, 0.3, 1e-50, 1e300, -1};
+    for (int n = 0; n < 5; ++n) fog->tree().setValueOn(Coord(n, 0, 0), values[std::size_t(n)]);
+    write_with_openvdb(folder / "fog.vdb", {fog});
+    for (const auto& [threshold, expected] : {std::pair(0.0, std::array<int, 5>{1, 1, 1, 1, 0}),
+                                              std::pair(0.1, std::array<int, 5>{0, 1, 0, 1, 0}),
+                                              std::pair(0.3, std::array<int, 5>{0, 0, 0, 1, 0})}) {
+        VdbReadOptions options;
+        options.grid = "cld";
+        const DensityGrid found = load_mask(folder / "fog.vdb", threshold, options).density;
+        ASSERT_EQ(found.extent(), (Extent{5, 1, 1}));
+        for (int n = 0; n < 5; ++n)
+            EXPECT_EQ(found.value(n, 0, 0), expected[std::size_t(n)]) << threshold << ", " << n;
+    }
 }
 
 // Axes in another order: the voxels' height lies along the file's first one.

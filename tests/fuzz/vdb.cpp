@@ -269,7 +269,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     VdbReadOptions options;
     options.limits = kLimits;
     read_twice([&] { return text_of(load_density(file.path(), options)); });
-    read_twice([&] { return text_of(load_mask(file.path(), options)); });
+    read_twice([&] { return text_of(load_mask(file.path(), 0, options)); });
     read_twice([&] { return text_of(read_vdb_info(file.path(), kLimits)); });
     read_twice([&] { return text_of(read_state(file.path(), kState, kStatePlace, kLimits)); });
     for (const int parts : {1, 3})

@@ -18,7 +18,6 @@
 #include <zlib.h>
 
 #include "core/error.h"
-#include "density/vdb/sanitized.h"
 #include "render/terrain/height_file.h"
 #include "tests/render/temporary_folder.h"
 
@@ -127,13 +126,15 @@ TEST_P(ExrHeights, AreThoseOfTheFile) {
 TEST_P(ExrHeights, OfAChunkThatLacksSomeAreDamage) {
     write_rows(path("rows.exr"), header_of(GetParam()));
     write_tiles(path("tiles.exr"), header_of(GetParam()));
-    if (NEPHOS_SANITIZED && GetParam() >= Imf::DWAA_COMPRESSION)
-        GTEST_SKIP() << "a sanitizer fills new memory itself";
     for (const char* name : {"rows.exr", "tiles.exr"}) {
         const std::string whole = content(path(name));
         const std::string chunk = whole.substr(last_size(whole) + 4);
-        for (const std::size_t size : {std::size_t(0), std::size_t(1), chunk.size() / 2, chunk.size() - 1}) {
-            write(path("damaged.exr"), with_last_chunk(whole, chunk.substr(0, size)));
+        for (const std::size_t size :
+             {std::size_t(0), std::size_t(1), chunk.size() / 2, chunk.size() - 1, std::size_t(1000)}) {
+            std::string other = chunk;
+            other.resize(
+                size);  // 1,000 are more than its pixels have, but not more than those of a whole chunk
+            write(path("damaged.exr"), with_last_chunk(whole, other));
             EXPECT_NE(reason_of(path("damaged.exr")).find("damaged.exr: cannot read heights of OpenEXR: "),
                       std::string::npos)
                 << name << ", " << size << " of " << chunk.size() << ": " << reason_of(path("damaged.exr"));
@@ -166,8 +167,7 @@ TEST_P(ExrHeights, OfAHeadThatClaimsMoreAreDamage) {
 INSTANTIATE_TEST_SUITE_P(All, ExrHeights,
                          testing::Values(Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION,
                                          Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION, Imf::PXR24_COMPRESSION,
-                                         Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION, Imf::DWAA_COMPRESSION,
-                                         Imf::DWAB_COMPRESSION));
+                                         Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION));
 
 // Whatever channels are beside it: of other sizes, or with fewer samples than pixels.
 TEST_P(ExrHeights, MayHaveOtherChannelsBesideThem) {
@@ -176,11 +176,10 @@ TEST_P(ExrHeights, MayHaveOtherChannelsBesideThem) {
         Imf::PixelType type;
         int sampling;
     };
-    for (const std::vector<Beside>& others :
-         {std::vector<Beside>{{"A", Imf::HALF, 1}},
-          std::vector<Beside>{{"A", Imf::HALF, 1}, {"aaa", Imf::UINT, 1}},
-          std::vector<Beside>{{"BY", Imf::HALF, 2}, {"RY", Imf::HALF, 2}},
-          std::vector<Beside>{{"BY", Imf::FLOAT, 5}, {"RY", Imf::FLOAT, 5}}}) {
+    for (const std::vector<Beside>& others : {std::vector<Beside>{{"A", Imf::HALF, 1}},
+                                              std::vector<Beside>{{"A", Imf::HALF, 1}, {"aaa", Imf::UINT, 1}},
+                                              std::vector<Beside>{{"BY", Imf::HALF, 2}, {"RY", Imf::HALF, 2}},
+                                              std::vector<Beside>{{"BY", Imf::FLOAT, 5}}}) {
         Imf::Header header = header_of(GetParam());
         std::vector<std::vector<float>> samples;
         samples.reserve(others.size());
@@ -202,6 +201,11 @@ TEST_P(ExrHeights, MayHaveOtherChannelsBesideThem) {
             Imf::OutputFile file(path("beside.exr").c_str(), header, 0);
             file.setFrameBuffer(buffer);
             file.writePixels(kRows);
+        }
+        if (others[0].sampling > 2) {
+            EXPECT_NE(reason_of(path("beside.exr")).find("its channel BY has less than half the rows"),
+                      std::string::npos);
+            continue;
         }
         const std::vector<float> found = read_height_file(path("beside.exr"), 0, 0).image.heights;
         ASSERT_EQ(found.size(), values.size());
@@ -237,37 +241,15 @@ TEST_P(ExrHeights, MayBeHalves) {
     }
 }
 
-// An island in a flat sea: what the chunks beside leave in memory is the same before and behind it.
-TEST(ExrHeightsOfDwa, OfAChunkBetweenEqualOnesAreDamage) {
-    if (NEPHOS_SANITIZED) GTEST_SKIP() << "a sanitizer fills new memory itself";
+// OpenEXR's core library cannot look at their chunks.
+TEST(ExrHeightsOfDwa, AreRefused) {
     const TemporaryFolder folder;
-    const fs::path path = folder.path() / "island.exr";
-    std::vector<float> values(64 * 96, 0);
-    for (int y = 40; y < 56; ++y)
-        for (int x = 16; x < 48; ++x) values[std::size_t(64 * y + x)] = float(x + y);
-    Imf::Header header(64, 96);
-    header.compression() = Imf::DWAA_COMPRESSION;
-    header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
-    Imf::FrameBuffer buffer;
-    buffer.insert("Z", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), 4, 4 * 64));
-    {
-        Imf::OutputFile file(path.c_str(), header, 0);
-        file.setFrameBuffer(buffer);
-        file.writePixels(96);
+    for (const Imf::Compression compression : {Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION}) {
+        write_rows(folder.path() / "a.exr", header_of(compression));
+        EXPECT_NE(
+            reason_of(folder.path() / "a.exr").find("its compression is DWA, of which damage goes unnoticed"),
+            std::string::npos);
     }
-    ASSERT_EQ(reason_of(path), "");
-    std::string bytes = content(path);
-    // Chunks begin with their first row and their size; the third number of 64 bits in one is how much of it is packed.
-    std::size_t at = 0;
-    for (std::size_t n = bytes.find("screenWindowWidth"); at == 0 && n + 8 < bytes.size(); ++n)
-        if (number_at(bytes, n) == 32 && number_at(bytes, n + 4) > 88 &&
-            number_at(bytes, n + 4) < bytes.size() - n)
-            at = n + 8;
-    ASSERT_GT(at, 0u);
-    std::fill_n(bytes.begin() + std::ptrdiff_t(at + 16), 8, '\0');
-    write(path, bytes);
-    EXPECT_NE(reason_of(path).find("a chunk does not give all of its pixels"), std::string::npos)
-        << reason_of(path);
 }
 
 // What is packed is whole by itself, but too short for the pixels.

@@ -266,6 +266,7 @@ TEST(Options, BadPathsAreRefused) {
     EXPECT_TRUE(contains(messages_of("seed = 1", {"field.ellipsoids[0].ext=1"}),
                          "`field.ellipsoids` is not in the scene"));
     EXPECT_TRUE(contains(messages_of("seed = 1\nwind = []", {"wind[0].time_s=1"}), "`wind` has no item 0"));
+    EXPECT_TRUE(contains(messages_of("seed = 1", {"field.elipsoids[0].ext=1"}), "did you mean `ellipsoids`"));
     EXPECT_TRUE(contains(messages_of("[[wind]]\nlevels=[{height_m=0, east_m_per_s=0}]", {"wind[1].time_s=1"}),
                          "it has 1 item, counted from 0"));
 }

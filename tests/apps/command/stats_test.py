@@ -331,7 +331,15 @@ class Stats(Case):
         self.assertAlmostEqual(high["base_mean_m"]["mean"] / 100, flat["base_mean_m"]["mean"] / 40, 9)
         self.assertIn("cells of 100 m, 40 m high", self.call("stats", "flat.vdb").stdout)
         self.assertEqual(self.stats("flat.vdb", "again.vdb")["statistics"]["base_mean_m"]["mean"], flat["base_mean_m"]["mean"])
-        self.refused(2, "stats", "flat.vdb", "high.vdb", says="another height of levels than the masks before it")
+        self.refused(2, "stats", "flat.vdb", "high.vdb", says="high.vdb: has another height of levels than the masks before it")
+        # A transform with a place loses digits of the edges.
+        for name, place in (("low.vdb", 500.3), ("top.vdb", 1300.9)):
+            grid = pyopenvdb.BoolGrid()
+            grid.name = "cld"
+            grid.copyFromArray(numpy.ascontiguousarray(mask.transpose()).astype(bool))
+            grid.transform = pyopenvdb.createLinearTransform([[100, 0, 0, 0], [0, 100, 0, 0], [0, 0, 100, 0], [0, 0, place, 1]])
+            pyopenvdb.write(str(self.folder / name), grids=[grid])
+        self.assertEqual(self.stats("low.vdb", "top.vdb")["statistics"]["cover"]["mean"], high["cover"]["mean"])
 
     def test_pictures_whose_head_lies_cost_nothing(self):
         def png(width, height, depth, data):

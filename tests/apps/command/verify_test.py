@@ -113,6 +113,14 @@ class Verify(Case):
                                  "with their checksums")
             self.assertNotIn("bytes agree", json.dumps(report))
 
+    def test_what_is_missing_does_not_agree(self):
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        whole = int(self.checks("out", "--hashes")["hashes"]["detail"].split()[0])
+        gone = sorted((self.folder / "out/density").glob("*.vdb"))[0]
+        size = gone.stat().st_size
+        gone.unlink()
+        self.assertRegex(self.checks("out", "--hashes", status=1)["hashes"]["detail"], rf"^{whole - size} bytes of \d+ of the files agree")
+
     def test_what_is_asked_for_is_done(self):
         self.call("run", self.scene, "--no-render", "--out", "out")
         self.call("export", "out", "--to", "raw", "-o", "volumes")
