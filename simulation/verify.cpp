@@ -198,8 +198,8 @@ std::vector<Check> check_files(const std::filesystem::path& folder, const std::v
                              is_listed ? ", none extra" : ""))};
     if (compared == files.size())
         checks.push_back(content.check("hashes", fmt::format("{} bytes agree with their checksums", bytes)));
-    else if (compared == 0 && !reading.none())
-        checks.push_back(reading.not_done("hashes"));
+    else if (compared == 0)
+        checks.push_back((reading.none() ? presence : reading).not_done("hashes"));
     else
         checks.push_back(content.check(
             "hashes",

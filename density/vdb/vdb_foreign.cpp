@@ -291,9 +291,10 @@ class Skewed {
         }
     }
 
-    static bool has_cloud(const FloatLeaf& leaf) {
+    // Tells values that are not 0, no numbers among them.
+    static bool has_values(const FloatLeaf& leaf) {
         return std::ranges::any_of(std::span(leaf.buffer().data(), kBlockVoxels),
-                                   [](float value) { return value > 0; });
+                                   [](float value) { return value != 0; });
     }
 
     // Our blocks that a leaf or tile of the file reaches, each once, in block order. Throws std::runtime_error where their
@@ -335,11 +336,11 @@ class Skewed {
         };
         const FloatTree& tree = foreign_.grid->tree();
         for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
-            if (!foreign_.is_mask || has_cloud(*leaf)) add(leaf->getNodeBoundingBox());
+            if (!foreign_.is_mask || has_values(*leaf)) add(leaf->getNodeBoundingBox());
         auto tile = tree.cbeginValueOn();
         tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
         for (; tile; ++tile)
-            if (!foreign_.is_mask || *tile > 0) add(tile.getBoundingBox());
+            if (!foreign_.is_mask || *tile != 0) add(tile.getBoundingBox());
         keep_each_once();
         return result;
     }

@@ -94,10 +94,11 @@ FloatGrid::Ptr float_grid(const openvdb::GridBase& grid, const FloatTree::Ptr& t
 
 // 1 where a voxel of a mask is active, and true where it has a value.
 template <typename Grid>
-FloatGrid::Ptr mask_as_float(const Grid& mask) {
-    return float_grid(mask, float_tree(mask.tree(), 0.0f, [](bool value, bool is_active) {
+FloatGrid::Ptr mask_as_float(const Grid& mask, double threshold) {
+    const bool is_any = threshold < 1;  // the value of what is set is 1
+    return float_grid(mask, float_tree(mask.tree(), 0.0f, [&](bool value, bool is_active) {
                           const bool is_set =
-                              is_active && (value || kIsActivityAlone<typename Grid::TreeType>);
+                              is_any && is_active && (value || kIsActivityAlone<typename Grid::TreeType>);
                           return FloatVoxel{is_set ? 1.0f : 0.0f, is_active};
                       }));
 }
@@ -136,8 +137,10 @@ FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid, std::optional<double
             return marked_above(*typed, *threshold);
     }
     if (const auto typed = openvdb::gridPtrCast<FloatGrid>(grid)) return typed;
-    if (const auto mask = openvdb::gridPtrCast<BoolGrid>(grid)) return mask_as_float(*mask);
-    if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) return mask_as_float(*mask);
+    if (const auto mask = openvdb::gridPtrCast<BoolGrid>(grid))
+        return mask_as_float(*mask, threshold.value_or(0));
+    if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid))
+        return mask_as_float(*mask, threshold.value_or(0));
     const auto typed = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
     if (!typed) throw std::runtime_error("it is damaged: a grid changed its type");
     return float_grid(*typed,

@@ -59,6 +59,7 @@ class Chunks {
         options.read_fn = read_part;
         options.size_fn = size_of;
         options.error_handler_fn = keep_message;
+        options.flags = EXR_CONTEXT_FLAG_STRICT_HEADER;  // else what the head lacks has a default
         require(exr_start_read(&file_, "heights", &options));
     }
     Chunks(const Chunks&) = delete;

@@ -150,10 +150,26 @@ class SceneReader {
     Document& document_;
 };
 
+bool is_array(const Key& key) {
+    switch (key.kind) {
+        case KeyKind::extent:
+        case KeyKind::vector:
+        case KeyKind::colour:
+        case KeyKind::range:
+        case KeyKind::counts:
+        case KeyKind::texts:
+        case KeyKind::boundaries:
+        case KeyKind::tables:
+            return true;
+        default:
+            return false;
+    }
+}
+
 KeyForm describe(const std::vector<std::string>& path) {
     const Key* key = find_key(path);
     if (key == nullptr) return {};
-    return {takes_text(*key), expected_text(*key), key->kind == KeyKind::tables};
+    return {takes_text(*key), expected_text(*key), is_array(*key)};
 }
 
 bool sets_model_files(std::string_view option) {

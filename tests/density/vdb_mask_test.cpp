@@ -114,6 +114,35 @@ TEST(VdbMask, AxesMayBeExchanged) {
                   is_cloud(*c) ? 1 : 0);
 }
 
+// What is below 0, or no number, is noticed where voxels are resampled, too, in parts without cloud.
+TEST(VdbMask, ResampledValuesBelowZeroAreCounted) {
+    const TemporaryFolder folder;
+    for (const double edge : {100.0, 60.0}) {
+        const auto fog = grid_of<openvdb::FloatGrid>({100, edge, edge});
+        fog->tree().setValueOn(Coord(0), 1.0f);
+        fog->tree().setValueOn(Coord(64, 0, 0), -1.0f);
+        write_with_openvdb(folder / "fog.vdb", {fog});
+        VdbReadOptions options;
+        options.grid = "cld";
+        EXPECT_GT(load_mask(folder / "fog.vdb", -0.5, options).negative, 0u);
+        fog->tree().setValueOn(Coord(64, 0, 0), std::nanf(""));
+        write_with_openvdb(folder / "fog.vdb", {fog});
+        for (const double threshold : {-0.5, 0.5})
+            EXPECT_THROW(load_mask(folder / "fog.vdb", threshold, options), Error);
+    }
+}
+
+// The value of a mask is 1, which is not above 1.
+TEST(VdbMask, ThresholdsAreThoseOfMasksToo) {
+    const TemporaryFolder folder;
+    write_with_openvdb(folder / "mask.vdb", {bool_grid({100, 100, 100})});
+    EXPECT_GT(load_mask(folder / "mask.vdb", 0.99).density.active_voxels(), 0u);
+    const DensityGrid none = load_mask(folder / "mask.vdb", 1).density;
+    EXPECT_EQ(none.extent(), (Extent{20, 14, 10}));
+    EXPECT_EQ(none.value(0, 0, 0), 0);
+    EXPECT_EQ(none.active_voxels(), 0u);
+}
+
 // Means of neighbours would make cloud of the clear voxels beside a cloud.
 TEST(VdbMask, ResampledVoxelsAreTheNearestOnes) {
     const TemporaryFolder folder;

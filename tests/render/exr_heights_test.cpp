@@ -241,6 +241,20 @@ TEST_P(ExrHeights, MayBeHalves) {
     }
 }
 
+// Without its attribute both of the library's readers would take ZIP for it.
+TEST(ExrHeightsWithoutCompression, AreRefused) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    write_rows(path, header_of(Imf::PXR24_COMPRESSION));
+    std::string bytes = content(path);
+    const std::size_t name = bytes.find("compression");
+    ASSERT_NE(name, bytes.npos);
+    bytes[name + 2] ^= 1;
+    write(path, bytes);
+    EXPECT_NE(reason_of(path).find("'compression' attribute not found"), std::string::npos)
+        << reason_of(path);
+}
+
 // OpenEXR's core library cannot look at their chunks.
 TEST(ExrHeightsOfDwa, AreRefused) {
     const TemporaryFolder folder;

@@ -263,6 +263,8 @@ TEST(Options, BadPathsAreRefused) {
     // And no more than that: no empty `wind`, which would be an error itself.
     EXPECT_EQ(messages_of("seed = 1", {"wind[0].time_s=1"}).find("error: `wind` is not in the scene"),
               messages_of("seed = 1", {"wind[0].time_s=1"}).rfind("error: "));
+    EXPECT_TRUE(contains(messages_of("seed = 1", {"camera.position_m[0]=1"}),
+                         "`camera.position_m` is not in the scene"));
     EXPECT_TRUE(contains(messages_of("seed = 1", {"field.ellipsoids[0].ext=1"}),
                          "`field.ellipsoids` is not in the scene"));
     EXPECT_TRUE(contains(messages_of("seed = 1\nwind = []", {"wind[0].time_s=1"}), "`wind` has no item 0"));
