@@ -108,7 +108,7 @@ bool PngInput::Decoder::read_head(bool keep_texts) {
 bool PngInput::Decoder::begin_rows() {
     if (setjmp(png_jmpbuf(png)) != 0) return false;
     png_set_chunk_malloc_max(png, 0);  // what follows the pixels is skipped, however long
-    png_set_benign_errors(png, 0);  // more pixels than there are, or another checksum of them, is damage
+    png_set_benign_errors(png, 0);     // more pixels than there are, or another checksum of them, is damage
     if (png_get_color_type(png, info) == PNG_COLOR_TYPE_PALETTE) {
         png_set_packing(png);  // a byte an index
         take_palette();

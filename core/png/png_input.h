@@ -43,10 +43,11 @@ class PngInput {
     int height() const;
     bool has_alpha() const;
     bool is_interlaced() const;
-    // Returns how many samples a pixel has as it is stored: 1 grey, 2 grey and alpha, 3 red, green and blue, 4 these and alpha, a palette's as 3 or 4.
+    // Returns how many samples a pixel has as it is stored: 1 grey, 2 grey and alpha, 3 red, green and blue, 4 these and
+    // alpha; a palette's has 3 or 4.
     int channels() const;
     int bits() const;  // of a sample, 16, or 8 for 8 and fewer
-    // The text of that keyword in the chunks before the pixels; nothing without PngLimits::texts.
+    // Returns the text of that keyword in the chunks before the pixels; nothing without PngLimits::texts.
     std::optional<std::string> text(const std::string& keyword) const;
 
     // Decodes the pixels, once, with one of these. Rows from the top. What is transparent is over black, mixed as light.

@@ -15,7 +15,7 @@
 namespace nephos {
 namespace {
 
-// The file while the library reads it by the functions below, which C calls.
+// Holds the file while the library reads it by the functions below, which C calls.
 struct Source {
     int fd = -1;
     int failure = 0;  // errno of a read
@@ -125,7 +125,7 @@ class Chunks {
 
     void require_pixels(const exr_chunk_info_t& chunk) {
         if (chunk.packed_size == 0) throw std::runtime_error("a chunk of its pixels is empty");
-        // What does not become smaller is stored as it is, which the core does not know of B44.
+        // Skips a chunk that did not become smaller and is stored as it is, which the core does not know of B44.
         if (chunk.packed_size == chunk.unpacked_size) return;
         // OpenEXR's reader takes what has more bytes than its pixels as it is, too; the core would unpack it.
         if (compression_ == EXR_COMPRESSION_NONE || chunk.packed_size > chunk.unpacked_size)
@@ -138,7 +138,7 @@ class Chunks {
         require(result);
     }
 
-    // Nobody needs the pixels themselves.
+    // Unpacks a chunk, and leaves out the pixels themselves.
     exr_result_t decode(exr_decode_pipeline_t& pipeline) {
         const exr_result_t chosen = exr_decoding_choose_default_routines(file_, 0, &pipeline);
         pipeline.unpack_and_convert_fn = nullptr;

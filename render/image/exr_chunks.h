@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Whether an OpenEXR file has all that its pixels are made of. For a confined child process (density/vdb/sandbox.h): the
+// Tells whether an OpenEXR file has all that its pixels are made of. For a confined child process (density/vdb/sandbox.h): the
 // caller runs it there. Private to the module.
 
 namespace nephos {

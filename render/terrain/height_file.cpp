@@ -108,8 +108,8 @@ bool read_png_rows(PngSource& source, PngHeader& header, std::vector<std::uint16
         header.colour = png_get_color_type(png, info);
         begin();
         if (!rows.empty()) {
-            png_set_benign_errors(png,
-                                  0);  // more pixels than there are, or another checksum of them, is damage
+            // More pixels than there are, or another checksum of them, is damage.
+            png_set_benign_errors(png, 0);
             png_set_swap(png);  // files have the high byte first
             const int passes = png_set_interlace_handling(png);
             png_read_update_info(png, info);

@@ -73,7 +73,7 @@ std::string_view kind_name(Node::Kind kind);
 struct KeyForm {
     bool takes_text = false;  // a value without leading quote or bracket is taken as text
     std::string expected;     // "true or false"; empty: the key is not known
-    bool is_array = false;    // of whatever
+    bool is_array = false;    // the key takes an array: of tables, numbers or texts
 };
 
 // The parsed scene file merged with the options, and all problems found so far. Not thread-safe.

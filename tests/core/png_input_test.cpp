@@ -28,7 +28,7 @@ struct Kind {
     int width = 13, height = 11;  // odd, so that the passes of interlaced pictures have ends of all kinds
 };
 
-// What a pixel is, 0..1: red, green, blue as coded, alpha.
+// Holds what a pixel is, 0..1: red, green, blue as coded, alpha.
 using Pixel = std::array<double, 4>;
 
 struct Source {

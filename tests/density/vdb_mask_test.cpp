@@ -114,7 +114,7 @@ TEST(VdbMask, AxesMayBeExchanged) {
                   is_cloud(*c) ? 1 : 0);
 }
 
-// What is below 0, or no number, is noticed where voxels are resampled, too, in parts without cloud.
+// Notices what is below 0, or no number, where voxels are resampled, too, in parts without cloud.
 TEST(VdbMask, ResampledValuesBelowZeroAreCounted) {
     const TemporaryFolder folder;
     for (const double edge : {100.0, 60.0}) {

@@ -266,7 +266,7 @@ TEST(ExrHeightsOfDwa, AreRefused) {
     }
 }
 
-// What is packed is whole by itself, but too short for the pixels.
+// Packs what is whole by itself, but too short for the pixels.
 TEST(ExrHeightsOfZip, OfAShortChunkAreDamage) {
     const TemporaryFolder folder;
     write_rows(folder.path() / "a.exr", header_of(Imf::ZIP_COMPRESSION));
