@@ -81,8 +81,6 @@ constexpr std::size_t kChunk = std::size_t{1} << 18;
 constexpr std::size_t kMaxText = std::size_t{1} << 16;
 constexpr int kMaxAttempts = 3;
 constexpr auto kStallTime = std::chrono::seconds(8);
-// Begins a message that says nothing of what is in the file: of the system, or of limits.
-constexpr std::string_view kCannotRead = "cannot read: ";
 constexpr const char* kTooLong = "cannot read: it takes longer than allowed";
 
 // The time that reading may take. It is asked twice a second while the child is waited for: where much more has passed between

@@ -26,6 +26,9 @@
 
 namespace nephos {
 
+// Begins a message of the child that says nothing of what is in the file: of the system, or of limits.
+inline constexpr std::string_view kCannotRead = "cannot read: ";
+
 // Limits of the child.
 struct SandboxLimits {
     double seconds = 60;         // of wall-clock time, of all attempts together: above 0, at most 1e6

@@ -12,6 +12,8 @@
 #include <OpenEXR/openexr.h>
 #include <unistd.h>
 
+#include "density/vdb/sandbox.h"
+
 namespace nephos {
 namespace {
 
@@ -91,7 +93,7 @@ class Chunks {
     void require(exr_result_t result) const {
         if (result == EXR_ERR_SUCCESS) return;
         if (source_.failure != 0)
-            throw std::runtime_error(std::string("cannot read: ") + std::strerror(source_.failure));
+            throw std::runtime_error(std::string(kCannotRead) + std::strerror(source_.failure));
         // Some decompressors call damage so.
         const bool is_damage = std::string_view(source_.message).starts_with("Unable to decompress");
         if (result == EXR_ERR_OUT_OF_MEMORY && !is_damage) throw std::bad_alloc();

@@ -137,9 +137,6 @@ ExrPart describe(const Imf::Header& header) {
     return part;
 }
 
-constexpr std::string_view kCannotRead =
-    "cannot read: ";  // begins what the parent takes for an error of the system
-
 // Throws what was thrown while `what` was done, as one message.
 [[noreturn]] void rethrow(const std::string& what, const std::exception& reason) {
     if (std::string_view(reason.what()).starts_with(kCannotRead)) throw std::runtime_error(reason.what());
