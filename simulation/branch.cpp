@@ -219,7 +219,7 @@ std::vector<OtherTable> tables_of_other_run(const RunSettings& settings, const R
     std::vector<OtherTable> tables;
     const auto open = [&](const std::filesystem::path& path, const std::filesystem::path& copy,
                           std::string_view header) {
-        OtherTable& table = tables.emplace_back(path, copy, header, open_stream(path));
+        OtherTable& table = tables.emplace_back(OtherTable{path, copy, header, open_stream(path)});
         for (const FileRecord& saved : run.tables)
             if (parent.folder / saved.path == path) require_table_of_run(table.file, path, saved.digest);
         read_statistics(table.file, path, steps, {}, header);

@@ -1,8 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Fails when a folder includes what it may not, a header of another module is private, a public header drags a heavy
-one along, or a source file lacks its licence line. The rules are the tables below; the root of the source tree is the
-argument. With --self-test the checker itself is tested: it must see each kind of offence."""
+one along, or a source file lacks its licence line, or specialises a function template that no header declares so. The
+rules are the tables below; the root of the source tree is the argument. With --self-test the checker itself is tested:
+it must see each kind of offence."""
 
 import functools
 import pathlib
@@ -74,6 +75,7 @@ LIBRARIES = {
 # Seconds and hundreds of megabytes each: never in a public header.
 HEAVY = ("openvdb/", "nanovdb/", "vulkan/")
 SOURCES = {".h", ".cpp", ".vert", ".frag", ".comp", ".glsl", ".py", ".sh"}
+SPECIALISATION = re.compile(r"^template <>\n[^;{]*?(\w+<[\w:]+>)\(", re.MULTILINE)
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
@@ -131,6 +133,12 @@ def include_problem(root, path, name):
     return None
 
 
+@functools.cache
+def is_declared(root, module, beginning):
+    """Whether a header of the module has a specialisation that begins so."""
+    return any(beginning in header.read_text(encoding="utf-8") for header in (root / module).rglob("*.h"))
+
+
 def problems_of(root, file):
     path = file.relative_to(root).as_posix()
     module = module_of(path)
@@ -138,6 +146,11 @@ def problems_of(root, file):
     text = file.read_text(encoding="utf-8")
     if "SPDX-License-Identifier: Apache-2.0" not in "\n".join(text.splitlines()[:3]):
         yield "lacks the line SPDX-License-Identifier: Apache-2.0"
+    if file.suffix == ".cpp":
+        for match in SPECIALISATION.finditer(text):
+            if not is_declared(root, module, match.group(1) + "("):
+                yield (f"line {text[:match.start()].count(chr(10)) + 1}: {match.group(1)}() is declared in no header: where another file "
+                       "uses it, each compiler takes what it likes")
     for number, line in enumerate(text.splitlines(), 1):
         match = INCLUDE.match(line)
         if not match:
@@ -182,9 +195,12 @@ def self_test():
         "render/cpu/view.h": licence + '#include "render/vulkan/lists.h"\n',
         "render/vulkan/lists.h": licence + '#include "render/cloud/splats.h"\n',
         "render/bare.cpp": "int x;\n",
+        "core/made.h": licence + "template <>\nint made<float>();\n",
+        "core/made.cpp": licence + "template <>\nint made<float>() {}\n",
+        "core/hidden.cpp": licence + "template <>\nint a::made<double>() {}\n",
     }
     expected = {"core/up.h", "automaton/automaton.h", "automaton/heavy.h", "automaton/step.cpp",
-                "render/cloud/splats.h", "render/cpu/view.h", "render/bare.cpp"}
+                "render/cloud/splats.h", "render/cpu/view.h", "render/bare.cpp", "core/hidden.cpp"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for module in MAY_USE:

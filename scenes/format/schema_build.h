@@ -165,12 +165,17 @@ Key table(std::string name, const Section& section, std::string effect) {
     return made;
 }
 
-// Returns the defaults of a new element of an array of tables.
+// Returns the defaults of a new element of an array of tables: those of its type, but for the types below, which are declared here
+// so that each use of tables() takes the same.
 template <typename Element>
 const Element& default_element() {
     static const Element element{};
     return element;
 }
+template <>
+const EllipsoidScatter& default_element<EllipsoidScatter>();  // in schema_automaton.cpp
+template <>
+const WindField& default_element<WindField>();  // in schema_wind.cpp
 
 template <auto... Members>
 Key tables(std::string name, const Section& section, int min_items, int max_items) {

@@ -12,10 +12,6 @@ namespace nephos {
 
 using namespace schema_build;
 
-// In schema_automaton.cpp.
-template <>
-const EllipsoidScatter& schema_build::default_element<EllipsoidScatter>();
-
 namespace {
 
 constexpr Limits kIntensity = between(0, 500);
