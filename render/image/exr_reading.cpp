@@ -17,10 +17,8 @@
 #include <OpenEXR/ImfCompressionAttribute.h>
 #include <OpenEXR/ImfDoubleAttribute.h>
 #include <OpenEXR/ImfFloatAttribute.h>
-#include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
-#include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
@@ -34,8 +32,6 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "density/vdb/sandbox.h"
-#include "render/image/exr_chunks.h"
-#include "render/image/exr_grid.h"
 #include "render/image/image_file.h"
 
 namespace nephos {
@@ -105,11 +101,6 @@ std::string attribute_text(const Imf::Attribute& attribute) {
     return std::string("<") + attribute.typeName() + ">";
 }
 
-std::string text_of(const Imath::Box2i& window) {
-    return "(" + joined(9, window.min.x, window.min.y) + ") to (" + joined(9, window.max.x, window.max.y) +
-           ")";
-}
-
 // Returns true for attributes that other fields of ExrPart contain.
 bool is_structural(const std::string& name) {
     for (const char* known :
@@ -164,9 +155,10 @@ class OpenFile : public Imf::IStream {
   private:
     void fill() {
         ssize_t got = 0;
-        do {
+        while (at_ < std::uint64_t(size_)) {  // a place that a damaged file names may be no off_t
             got = ::pread(fd_, buffer_.data(), buffer_.size(), off_t(at_));
-        } while (got < 0 && errno == EINTR);
+            if (got >= 0 || errno != EINTR) break;
+        }
         if (got < 0) throw std::runtime_error(std::string(kCannotRead) + std::strerror(errno));
         if (got == 0) throw std::runtime_error("it ends early");
         begin_ = at_;
@@ -219,64 +211,12 @@ ExrPart received(SandboxReader& reader) {
 
 }  // namespace
 
-void prepare_exr() { Imf::staticInitialize(); }
-
-ExrGrid parse_exr_grid(int fd, int most) {
-    try {
-        OpenFile stream(fd, "heights");
-        Imf::MultiPartInputFile file(stream, 0);  // no threads
-        const Imf::Header& header = file.header(0);
-        if (header.hasType() && Imf::isDeepData(header.type())) throw std::runtime_error("it holds deep data");
-        const Imath::Box2i window = header.dataWindow();
-        const long long columns = 1LL + window.max.x - window.min.x, rows = 1LL + window.max.y - window.min.y;
-        if (columns < 2 || rows < 2 || columns > most || rows > most) {
-            throw std::runtime_error("it is " + std::to_string(columns) + " x " + std::to_string(rows) +
-                                     " heights; expected 2 to " + std::to_string(most) + " on a side");
-        }
-        if (const Imath::Box2i display = header.displayWindow(); display != window)
-            throw std::runtime_error("its data window is " + text_of(window) + ", its display window " +
-                                     text_of(display) +
-                                     "; expected the same, a height in each pixel of the map");
-        const Imf::ChannelList& channels = header.channels();
-        std::string name, all;
-        int count = 0;
-        for (auto c = channels.begin(); c != channels.end(); ++c, ++count) {
-            all += (count > 0 ? ", " : "") + std::string(c.name());
-            if (count == 0) name = c.name();
-        }
-        if (count > 1) {
-            name.clear();
-            for (const char* known : {"R", "height", "Y", "Z"})
-                if (channels.findChannel(known) != nullptr) name = known;
-        }
-        const Imf::Channel* channel = name.empty() ? nullptr : channels.findChannel(name);
-        if (channel == nullptr)
-            throw std::runtime_error("its channels are " + all + "; expected one alone, or one named Z, Y, height or R");
-        if (channel->xSampling != 1 || channel->ySampling != 1)
-            throw std::runtime_error("its channel " + name + " has fewer samples than pixels");
-        require_whole_chunks(fd);
-        ExrGrid grid{int(columns), int(rows), {}};
-        grid.values.resize(std::size_t(columns) * std::size_t(rows));
-        const std::size_t row = sizeof(float) * std::size_t(columns);
-        Imf::FrameBuffer buffer;
-        buffer.insert(name, Imf::Slice::Make(Imf::FLOAT, grid.values.data(), window, sizeof(float), row));
-        Imf::InputPart part(file, 0);
-        part.setFrameBuffer(buffer);
-        part.readPixels(window.min.y, window.max.y);
-        return grid;
-    } catch (const std::bad_alloc&) {
-        throw;
-    } catch (const std::exception& reason) {
-        rethrow("heights of OpenEXR", reason);
-    }
-}
-
 ExrInfo read_exr_info(const std::filesystem::path& path) {
     constexpr SandboxLimits kLimits{.seconds = 60, .memory_bytes = std::size_t{1} << 30, .most_bytes = 16u << 20};
     const Descriptor opened = open_regular_file(path, O_RDONLY);
     const int kept[] = {opened.get()};
     ExrInfo info;
-    prepare_exr();  // before the fork, so that the child finds it done
+    Imf::staticInitialize();  // before the fork, so that the child finds it done
     run_sandboxed(
         path, "OpenEXR", kLimits, kept,
         [&](SandboxWriter& writer) {

@@ -218,7 +218,6 @@ HeightFile read_height_file(const std::filesystem::path& path, int raw_columns, 
     if (format == HeightFormat::png) {
         file.image = parse_confined(path, "libpng", parse_height_png);
     } else if (format == HeightFormat::exr) {
-        prepare_exr();
         file.image = parse_confined(path, "OpenEXR", [](int fd) {
             ExrGrid grid = parse_exr_grid(fd, kMostHeights);
             return HeightImage{grid.columns, grid.rows, std::move(grid.values)};

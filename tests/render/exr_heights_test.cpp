@@ -10,10 +10,13 @@
 #include <vector>
 
 #include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfCompressionAttribute.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfTiledOutputFile.h>
+#include <OpenEXR/ImfVecAttribute.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -241,18 +244,137 @@ TEST_P(ExrHeights, MayBeHalves) {
     }
 }
 
-// Without its attribute both of the library's readers would take ZIP for it.
+// One bit of the head: without its attribute, or for an unknown value, both of the library's readers would take ZIP for it.
 TEST(ExrHeightsWithoutCompression, AreRefused) {
     const TemporaryFolder folder;
     const fs::path path = folder.path() / "a.exr";
     write_rows(path, header_of(Imf::PXR24_COMPRESSION));
+    const std::string whole = content(path);
+    const std::size_t name = whole.find("compression");
+    ASSERT_NE(name, whole.npos);
+    const auto reason = [&](std::size_t at, char bit) {
+        std::string bytes = whole;
+        bytes[name + at] ^= bit;
+        write(path, bytes);
+        return reason_of(path);
+    };
+    EXPECT_NE(reason(2, 1).find("its head has no compression"), std::string::npos);
+    EXPECT_NE(reason(12, 1).find("its compression is not of the type compression"), std::string::npos);
+    EXPECT_NE(reason(28, '\x80').find("its compression is 133, which is none"), std::string::npos);
+}
+
+TEST(ExrHeightsWithTwoCompressions, AreRefused) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    Imf::Header header = header_of(Imf::ZIP_COMPRESSION);
+    header.insert("compressios", Imf::CompressionAttribute(Imf::PXR24_COMPRESSION));
+    write_rows(path, header);
     std::string bytes = content(path);
-    const std::size_t name = bytes.find("compression");
-    ASSERT_NE(name, bytes.npos);
-    bytes[name + 2] ^= 1;
+    bytes[bytes.find("compressios") + 10] = 'n';
     write(path, bytes);
-    EXPECT_NE(reason_of(path).find("'compression' attribute not found"), std::string::npos)
+    EXPECT_NE(reason_of(path).find("its head has two of compression"), std::string::npos) << reason_of(path);
+}
+
+// Names that the format has for other files may be those of anybody's attributes in one of rows.
+TEST(ExrHeightsWithAttributes, OfReservedNamesAreRead) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    for (const char* name : {"version", "chunkCount", "name"}) {
+        Imf::Header header = header_of(Imf::ZIP_COMPRESSION);
+        if (name == std::string("version"))
+            header.insert(name, Imf::StringAttribute("1.2.3"));
+        else
+            header.insert("placeholder", Imf::V2fAttribute({1, 2}));
+        write_rows(path, header);
+        if (std::string bytes = content(path); name != std::string("version")) {
+            const std::size_t at = bytes.find("placeholder");
+            const std::size_t table =
+                bytes.size();  // places of chunks would move with the head: it keeps its length
+            const std::string filled = std::string(name) + '\0' + "string" + '\0';
+            ASSERT_NE(at, bytes.npos);
+            const std::size_t length = std::strlen("placeholder") + 1 + std::strlen("v2f") + 1 + 4 + 8;
+            const auto size = std::uint32_t(length - filled.size() - 4);
+            std::string attribute = filled + std::string(reinterpret_cast<const char*>(&size), 4);
+            attribute += std::string(size, 'a');
+            bytes.replace(at, length, attribute);
+            ASSERT_EQ(bytes.size(), table);
+            write(path, bytes);
+        }
+        EXPECT_EQ(read_height_file(path, 0, 0).image.heights, heights()) << name << ": " << reason_of(path);
+    }
+}
+
+std::uint64_t place_at(const std::string& bytes, std::size_t at) {
+    std::uint64_t value = 0;
+    std::memcpy(&value, bytes.data() + at, sizeof value);
+    return value;
+}
+
+// The place of the table of places, whose first entry is that of what follows it.
+std::size_t table_of(const std::string& bytes, std::size_t chunks) {
+    for (std::size_t at = 8; at + 8 * chunks < bytes.size(); ++at)
+        if (place_at(bytes, at) == at + 8 * chunks) return at;
+    ADD_FAILURE() << "no table";
+    return 0;
+}
+
+std::string number_bytes(std::uint64_t value, std::size_t size) {
+    return {reinterpret_cast<const char*>(&value), size};
+}
+
+// Readers that go by the order in the file take the first chunk where another stands in its place.
+TEST(ExrHeightsOfATable, AreThoseOfTheChunksThatItNames) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    write_rows(path, header_of(Imf::ZIPS_COMPRESSION));
+    std::string bytes = content(path);
+    const std::size_t table = table_of(bytes, kRows);
+    const std::size_t first = place_at(bytes, table), second = place_at(bytes, table + 8);
+    const std::string chunk = bytes.substr(first, second - first);
+    bytes.replace(table, 8, number_bytes(bytes.size(), 8));
+    bytes.replace(first + 4, 4, number_bytes(1, 4));  // of one byte
+    write(path, bytes + chunk);
+    EXPECT_EQ(read_height_file(path, 0, 0).image.heights, heights()) << reason_of(path);
+}
+
+// The library finds the chunks where they are.
+TEST(ExrHeightsOfATable, WithAPlaceBeyondAnyFileAreThoseOfItsChunks) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    for (const bool in_tiles : {false, true}) {
+        if (in_tiles)
+            write_tiles(path, header_of(Imf::ZIP_COMPRESSION));
+        else
+            write_rows(path, header_of(Imf::ZIPS_COMPRESSION));
+        std::string bytes = content(path);
+        bytes[table_of(bytes, in_tiles ? 2 * 5 : kRows) + 7] ^= '\x80';
+        write(path, bytes);
+        EXPECT_EQ(read_height_file(path, 0, 0).image.heights, heights()) << reason_of(path);
+    }
+}
+
+// Without compression a size with one other bit may be that of two chunks.
+TEST(ExrHeightsOfChunks, ThatShareBytesAreDamage) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    write_rows(path, header_of(Imf::ZIPS_COMPRESSION));
+    std::string bytes = content(path);
+    const std::size_t first = place_at(bytes, table_of(bytes, kRows));
+    bytes.replace(first + 4, 4, number_bytes(4 * kColumns, 4));
+    write(path, bytes);
+    EXPECT_NE(reason_of(path).find("two chunks of its pixels share bytes"), std::string::npos)
         << reason_of(path);
+}
+
+// Whatever the first part is.
+TEST(ExrHeightsBesideDeepData, AreRefused) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    write_rows(path, header_of(Imf::ZIP_COMPRESSION));
+    std::string bytes = content(path);
+    bytes[5] |= '\x08';
+    write(path, bytes);
+    EXPECT_NE(reason_of(path).find("it holds deep data"), std::string::npos) << reason_of(path);
 }
 
 // OpenEXR's core library cannot look at their chunks.
