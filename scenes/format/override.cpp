@@ -152,13 +152,18 @@ void Document::set(const std::string& option, KeyForm (*describe)(const std::vec
             }
             Entry* entry = node->find(step.name);
             const bool wants_item = n + 1 < path.steps.size() && path.steps[n + 1].name.empty();
-            if (entry == nullptr && wants_item &&
-                describe(names_on({{path.steps.begin(), path.steps.begin() + std::ptrdiff_t(n) + 1}}))
-                    .is_array) {
-                report(place,
-                       enclosed(reached + (reached.empty() ? "" : ".") + step.name, '`') +
-                           " is not in the scene",
-                       "expected an array there, of which this changes an item");
+            if (entry == nullptr && wants_item) {
+                const KeyForm form =
+                    describe(names_on({{path.steps.begin(), path.steps.begin() + std::ptrdiff_t(n) + 1}}));
+                const std::string whole = enclosed(reached + (reached.empty() ? "" : ".") + step.name, '`');
+                if (form.is_array)
+                    report(place, whole + " is not in the scene",
+                           "expected an array there, of which this changes an item");
+                else if (!form.expected.empty())
+                    report(place, whole + " has no items", "expected " + form.expected);
+                else
+                    node->entries.push_back(
+                        {step.name, place, {}});  // of which it is said that it is unknown
                 return;
             }
             if (entry == nullptr) {

@@ -267,6 +267,14 @@ TEST(Options, BadPathsAreRefused) {
                          "`camera.position_m` is not in the scene"));
     EXPECT_TRUE(contains(messages_of("seed = 1", {"field.ellipsoids[0].ext=1"}),
                          "`field.ellipsoids` is not in the scene"));
+    for (const auto& [option, says] : {std::pair("nosuch[0]=1", "unknown key `nosuch`"),
+                                       std::pair("time.nosuch[0]=1", "unknown key `nosuch`"),
+                                       std::pair("time.steps[0]=3", "`time.steps` has no items"),
+                                       std::pair("time[0]=3", "`time` has no items")}) {
+        const std::string messages = messages_of("seed = 1", {option});
+        EXPECT_TRUE(contains(messages, says)) << messages;
+        EXPECT_EQ(messages.find("error: "), messages.rfind("error: ")) << messages;
+    }
     EXPECT_TRUE(contains(messages_of("seed = 1\nwind = []", {"wind[0].time_s=1"}), "`wind` has no item 0"));
     EXPECT_TRUE(contains(messages_of("seed = 1", {"field.elipsoids[0].ext=1"}), "did you mean `ellipsoids`"));
     EXPECT_TRUE(contains(messages_of("[[wind]]\nlevels=[{height_m=0, east_m_per_s=0}]", {"wind[1].time_s=1"}),
