@@ -108,39 +108,70 @@ std::vector<StateHash> hashes_of_steps(const RunListing& run) {
     return hashes;
 }
 
-Check compare_runs(const RunListing& run, const std::filesystem::path& other_folder) {
-    const RunListing other = read_run(other_folder);
-    Problems problems;
-    std::size_t steps = 0;
-    try {
-        const std::vector<StateHash> own = hashes_of_steps(run), others = hashes_of_steps(other);
-        if (others.size() != own.size())
-            problems.add(fmt::format("it has {} steps, not {}", others.size(), own.size()));
-        steps = std::min(own.size(), others.size());
-        for (std::size_t n = 0; n < steps; ++n)
-            if (!(own[n] == others[n])) problems.add(fmt::format("step {}: another state", n));
-    } catch (const ReadFailure&) {
-        throw;
-    } catch (const Error& error) {
-        problems.add(error.what());
-    }
+// Compares the tables of two runs, step by step. Returns how many steps both have.
+std::size_t compare_steps(const RunListing& run, const RunListing& other, Problems& problems) {
+    const std::vector<StateHash> own = hashes_of_steps(run), others = hashes_of_steps(other);
+    if (others.size() != own.size())
+        problems.add(fmt::format("it has {} steps, not {}", others.size(), own.size()));
+    const std::size_t steps = std::min(own.size(), others.size());
+    for (std::size_t n = 0; n < steps; ++n)
+        if (!(own[n] == others[n])) problems.add(fmt::format("step {}: another state", n));
+    return steps;
+}
+
+std::map<std::string, std::string> voxels_of(const ListedFrame& frame) {
+    std::map<std::string, std::string> voxels;
+    for (const FileRecord& file : frame.files)
+        if (!file.voxels.empty()) voxels[file.path] = file.voxels;
+    return voxels;
+}
+
+// Compares the frames of two runs by what their manifests say. Returns how many files have the same voxels.
+std::size_t compare_frames(const RunListing& run, const RunListing& other, Problems& problems) {
     std::map<int, const ListedFrame*> frames;
     for (const ListedFrame& frame : other.frames) frames[frame.number] = &frame;
     if (other.frames.size() != run.frames.size())
         problems.add(fmt::format("it has {} frames, not {}", other.frames.size(), run.frames.size()));
+    std::size_t same = 0;
     for (const ListedFrame& frame : run.frames) {
         const auto found = frames.find(frame.number);
         if (found == frames.end()) continue;
         if (found->second->state_hash != frame.state_hash)
             problems.add(fmt::format("frame {}: another state", frame.number));
-        std::map<std::string, std::string> voxels;
-        for (const FileRecord& file : found->second->files) voxels[file.path] = file.voxels;
-        for (const FileRecord& file : frame.files)
-            if (!file.voxels.empty() && voxels[file.path] != file.voxels)
-                problems.add(file.path + ": other voxels");
+        std::map<std::string, std::string> others = voxels_of(*found->second);
+        for (const auto& [path, voxels] : voxels_of(frame)) {
+            const auto file = others.extract(path);
+            if (file.empty())
+                problems.add(fmt::format("it has no {}", path));
+            else if (file.mapped() != voxels)
+                problems.add(path + ": other voxels");
+            else
+                ++same;
+        }
+        for (const auto& [path, voxels] : others) problems.add(fmt::format("it has {} besides", path));
     }
-    return problems.check("against", fmt::format("{}: the same states in {} steps and voxels in {} frames",
-                                                 other_folder.string(), steps, run.frames.size()));
+    return same;
+}
+
+Check compare_runs(const RunListing& run, const std::filesystem::path& other_folder) {
+    Problems problems, unread;
+    std::size_t steps = 0, files = 0;
+    try {
+        if (seal_of(other_folder / "manifest.json") == Seal::broken)
+            problems.add("the bytes of its manifest.json are not those that were written");
+        const RunListing other = read_run(other_folder);
+        files = compare_frames(run, other, problems);
+        steps = compare_steps(run, other, problems);
+    } catch (const ReadFailure& failure) {
+        unread.add(failure.what());
+    } catch (const Error& error) {
+        problems.add(error.what());
+    }
+    if (problems.none() && !unread.none()) return unread.not_done("against");
+    return problems.check(
+        "against",
+        fmt::format("{}: by tables and manifests the same states in {} steps and the same voxels in {} files",
+                    other_folder.string(), steps, files));
 }
 
 }  // namespace
@@ -224,6 +255,9 @@ Check check_list(const std::filesystem::path& list) {
 
 Verification verify_run(const std::filesystem::path& folder, const VerifyOptions& options) {
     const RunListing run = read_run(folder);
+    if (options.against && !is_there(*options.against / "manifest.json"))
+        throw Error(ErrorCode::usage,
+                    options.against->string() + ": is no folder of a run: it has no manifest.json");
     Verification result{"run", {check_list(folder / "manifest.json")}};
     result.checks.push_back(check_numbers(run));
     std::vector<ListedFile> files;

@@ -25,9 +25,10 @@ struct Check {
 
 struct VerifyOptions {
     bool hashes_only = false;  // of files: nothing is decoded
-    // Another run that must have the same voxels and states, frame by frame, with whatever compression.
+    // Another run that must have the same voxels and states, frame by frame, with whatever compression: by its tables and its
+    // manifest; whether its files are as that says is told by a check of that run.
     std::optional<std::filesystem::path> against;
-    // Frames to simulate anew and to compare, from the first on; 0: none. It takes the files that the scene starts from, and
+    // Frames to simulate anew and to compare, from the first on, by states and by voxels of files that are not refined; 0: none. It takes the files that the scene starts from, and
     // of a branch the checkpoint of the other run that it began with, both as they were.
     int replay = 0;
     // The largest change of a voxel from frame to frame that passes; none: it is reported and always passes.
@@ -45,7 +46,7 @@ struct Verification {
 };
 
 // Checks a run. Reads one frame after the other; keeps two. Throws Error(io) when its manifest cannot be read, and
-// Error(usage) when `against` is no run. Everything else that is wrong becomes a check that has not passed.
+// Error(usage) when `against` has no manifest. Everything else that is wrong becomes a check that has not passed.
 Verification verify_run(const std::filesystem::path& folder, const VerifyOptions& options);
 
 // What a list of files says against what is there.

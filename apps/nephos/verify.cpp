@@ -90,9 +90,10 @@ void add_verify_command(CLI::App& app, Action& action) {
     command
         ->add_option_function<std::string>(
             "--against", [a](const std::string& text) { a->options.against = text; },
-            "Another run that must have the same states and voxels")
+            "Another run that must have the same states and voxels, by its tables and manifest")
         ->type_name("DIR");
-    add_value(*command, "--replay", "N", "Simulate the first N frames anew and compare states and voxels",
+    add_value(*command, "--replay", "N",
+              "Simulate the first N frames anew and compare states, and voxels of files that are not refined",
               [a](const std::string& text) { a->options.replay = int(parse_integer(text, 1, kMaxFrames)); });
     command->add_flag("--seam", a->options.seam,
                       "Demand that the box continues into itself on both horizontal axes, periodic or not");

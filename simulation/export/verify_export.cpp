@@ -398,16 +398,23 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
         }
     }
     std::vector<std::filesystem::path> extra;
-    for (const std::string& name : names_in_folder(folder))
-        if (!names.contains(name)) extra.emplace_back(name);
-    const bool is_empty =
-        extra.empty() && names == std::set<std::filesystem::path>{"export.json", kExportWork};
+    Problems unlisted;
+    try {
+        for (const std::string& name : names_in_folder(folder))
+            if (!names.contains(name)) extra.emplace_back(name);
+    } catch (const ReadFailure& failure) {
+        unlisted.add(failure.what());
+    }
+    const bool is_empty = extra.empty() && unlisted.none() &&
+                          names == std::set<std::filesystem::path>{"export.json", kExportWork};
     if (!list.complete)
         result.checks.push_back(
             {"complete", false,
              is_empty ? "the export has made nothing yet: it was refused or interrupted"
                       : "the export was interrupted or refused: the same command goes on, or says why not"});
-    for (Check& check : check_files(folder, files, extra, true)) result.checks.push_back(std::move(check));
+    for (Check& check : check_files(folder, files, extra, unlisted.none()))
+        result.checks.push_back(std::move(check));
+    if (!unlisted.none()) result.checks.push_back(unlisted.not_done("listing"));
     if (!options.hashes_only) {
         for (Check& check : check_sidecars(folder, list)) result.checks.push_back(std::move(check));
         for (Check& check : check_voxels(folder, list)) result.checks.push_back(std::move(check));

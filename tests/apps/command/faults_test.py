@@ -167,6 +167,16 @@ class Faults(Case):
         result = self.call("verify", "out", status=1, **unread)
         self.assertIn("FAIL  hashes    density/tiny_0003.vdb: 7 bytes, not", result.stdout)
         self.assertIn("tiny_0002.vdb: cannot read", result.stdout)
+        # Nor of another run that is compared with, which alone is no verdict.
+        self.call("run", self.scene, "--no-render", "--out", "other")
+        for name in ("other/statistics.csv", "other/manifest.json"):
+            with self.subTest(name):
+                env = self.failing("read EIO 1 1000", name)
+                said = self.call("verify", "out", "--against", "other", "--hashes", status=1, env=env).stdout
+                self.assertIn("FAIL  hashes    density/tiny_0003.vdb: 7 bytes, not", said)
+                self.assertIn(f"none  against   {name}: cannot", said)
+                said = self.call("verify", "other", "--against", "other", "--hashes", status=3, env=env)
+                self.assertIn("Input/output error", said.stdout + said.stderr)
 
     def fails_at_each_call(self, call, path, *arguments):
         """Lets one call on a file fail after the other, also in the process that parses it; returns how many there are."""
@@ -275,6 +285,13 @@ class Faults(Case):
         self.assertIn("tiny_0099.vdb is listed nowhere", self.call("verify", "run", status=1).stdout)
         result = self.call("verify", "run", status=3, env=self.failing("open EIO 1 1", "run/density"))
         self.assertIn("none  listing   run/density: cannot read: Input/output error", result.stdout)
+        self.call("export", "run", "--to", "raw", "-o", "volumes")
+        (self.folder / "volumes/tiny_0001.raw").write_bytes(b"damaged")
+        said = [subprocess.run([NEPHOS, "verify", "volumes"], cwd=self.folder, capture_output=True, text=True, timeout=PATIENCE,
+                               env=self.failing(f"open EIO {number} 1", "volumes")).stdout for number in range(1, 10)]
+        unlisted = [text for text in said if "none  listing   volumes: cannot read: Input/output error" in text]
+        self.assertEqual(len(unlisted), 1, said)
+        self.assertIn("FAIL  hashes    tiny_0001.raw: 7 bytes, not", unlisted[0])
 
     def test_a_file_that_cannot_be_examined_is_not_lost(self):
         """Scenes and reports that would be written over, a table of the user's own, private files: whichever stat fails."""

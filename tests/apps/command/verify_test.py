@@ -232,7 +232,7 @@ class Verify(Case):
         for name, seed in (("a", 1), ("b", 1), ("c", 9)):
             self.call("run", self.scene, "--statistics-only", "--seed", seed, "--out", name)
         self.call("run", self.scene, "--statistics-only", "--seed", 1, "--set", "time.steps=4", "--out", "short")
-        self.assertEqual(self.checks("a", "--against", "b")["against"]["detail"], "b: the same states in 7 steps and voxels in 0 frames")
+        self.assertEqual(self.checks("a", "--against", "b")["against"]["detail"], "b: by tables and manifests the same states in 7 steps and the same voxels in 0 files")
         self.assertEqual(self.checks("a")["frames"]["detail"], "of statistics alone")
         self.assertEqual(self.failed("a", "--against", "c"), ["against"])
         self.assertIn("it has 5 steps, not 7", self.call("verify", "a", "--against", "short", status=1).stdout)
@@ -275,6 +275,22 @@ class Verify(Case):
         self.assertEqual(self.failed("a", "--against", "b"), ["against"])
         self.assertEqual(self.failed("a", "--against", "c"), ["against"])
         self.assertEqual(self.failed("a", "--max-change", 0), ["motion"])
+        self.assertIn("and the same voxels in 5 files", self.checks("a", "--against", "a")["against"]["detail"])
+        # What the other manifest says counts where it is as it was written.
+        path = self.folder / "b/manifest.json"
+        path.write_bytes(path.read_bytes().replace(b'"time_s"', b'"time_S"'))
+        self.assertIn("the bytes of its manifest.json are not those that were written",
+                      self.call("verify", "a", "--against", "b", "--hashes", status=1).stdout)
+        self.refused(2, "verify", "a", "--against", "nowhere", says="nowhere: is no folder of a run: it has no manifest.json")
+
+    def test_against_a_run_with_other_files(self):
+        scene = self.write("layered.toml", LAYERED)
+        self.call("run", scene, "--no-render", "--out", "all")
+        self.call("run", scene, "--no-render", "--out", "layers", "--set", "density.combined=false")
+        files = len(list((self.folder / "all/density").rglob("*.vdb")))
+        self.assertIn(f"the same voxels in {files} files", self.checks("all", "--against", "all")["against"]["detail"])
+        self.assertIn("it has no density/layered_0001.vdb", self.call("verify", "all", "--against", "layers", status=1).stdout)
+        self.assertIn("it has density/layered_0001.vdb besides", self.call("verify", "layers", "--against", "all", status=1).stdout)
 
     def test_a_run_that_was_resumed_into_more_steps(self):
         """Its files are, byte for byte, those of a run that had the steps from the start."""
@@ -352,6 +368,27 @@ class Replay(Case):
 
     def state(self, path, steps):
         self.call("state", self.scene, "--steps", steps, "--out", path)
+
+    def test_says_which_voxels_it_compares(self):
+        """Those of each file that is not refined, of layers too."""
+        scene = self.write("layered.toml", LAYERED)
+        self.call("run", scene, "--no-render", "--out", "out")
+        path = self.folder / "out/manifest.json"
+        whole = json.loads(path.read_text())
+        for file in whole["frames"][1]["files"]:
+            with self.subTest(file["path"]):
+                manifest = json.loads(json.dumps(whole))
+                for other in manifest["frames"][1]["files"]:
+                    if other["path"] == file["path"]:
+                        other["voxels_xxh3"] = "0" * 32
+                path.write_text(unsealed(manifest))
+                self.assertIn(f"{file['path']}: other voxels", self.call("verify", "out", "--hashes", "--replay", 2, status=1).stdout)
+        path.write_text(unsealed(whole))
+        self.assertIn("2 frames simulated anew have the same states, and 6 files of them the same voxels", self.replay("out", frames=2)[0])
+        self.call("run", scene, "--no-render", "--out", "fine", "--set", "density.refine=2")
+        self.assertIn("have the same states; voxels of refined files are not compared", self.replay("fine", frames=2)[0])
+        self.call("run", self.scene, "--no-render", "--out", "plain")
+        self.assertIn("2 frames simulated anew have the same states, and 2 files", self.replay("plain", frames=2)[0])
 
     def test_of_a_run_that_starts_from_a_state(self):
         (self.folder / "in").mkdir()
