@@ -126,6 +126,11 @@ std::map<std::string, std::string> voxels_of(const ListedFrame& frame) {
     return voxels;
 }
 
+// Manifests of earlier versions list no files.
+bool is_unlisted(const RunListing& run, const ListedFrame& frame) {
+    return frame.files.empty() && has_density(run.scene);
+}
+
 // Compares the frames of two runs by what their manifests say. Returns how many files have the same voxels.
 std::size_t compare_frames(const RunListing& run, const RunListing& other, Problems& problems) {
     std::map<int, const ListedFrame*> frames;
@@ -139,6 +144,10 @@ std::size_t compare_frames(const RunListing& run, const RunListing& other, Probl
         if (found->second->state_hash != frame.state_hash)
             problems.add(fmt::format("frame {}: another state", frame.number));
         std::map<std::string, std::string> others = voxels_of(*found->second);
+        if (is_unlisted(run, frame) || is_unlisted(other, *found->second)) {
+            problems.add("a manifest of an earlier version has no checksums: run its scene anew");
+            continue;
+        }
         for (const auto& [path, voxels] : voxels_of(frame)) {
             const auto file = others.extract(path);
             if (file.empty())
@@ -151,6 +160,16 @@ std::size_t compare_frames(const RunListing& run, const RunListing& other, Probl
         for (const auto& [path, voxels] : others) problems.add(fmt::format("it has {} besides", path));
     }
     return same;
+}
+
+// Throws Error(usage) where there is none. One that cannot be looked at is told beside the other checks.
+void require_manifest(const std::filesystem::path& folder) {
+    try {
+        if (is_there(folder / "manifest.json")) return;
+    } catch (const ReadFailure&) {
+        return;
+    }
+    throw Error(ErrorCode::usage, folder.string() + ": is no folder of a run: it has no manifest.json");
 }
 
 Check compare_runs(const RunListing& run, const std::filesystem::path& other_folder) {
@@ -255,9 +274,7 @@ Check check_list(const std::filesystem::path& list) {
 
 Verification verify_run(const std::filesystem::path& folder, const VerifyOptions& options) {
     const RunListing run = read_run(folder);
-    if (options.against && !is_there(*options.against / "manifest.json"))
-        throw Error(ErrorCode::usage,
-                    options.against->string() + ": is no folder of a run: it has no manifest.json");
+    if (options.against) require_manifest(*options.against);
     Verification result{"run", {check_list(folder / "manifest.json")}};
     result.checks.push_back(check_numbers(run));
     std::vector<ListedFile> files;
@@ -268,14 +285,14 @@ Verification verify_run(const std::filesystem::path& folder, const VerifyOptions
     };
     bool recorded = true;
     for (const ListedFrame& frame : run.frames) {
-        recorded = recorded && !frame.files.empty();
+        recorded = recorded && !is_unlisted(run, frame);
         for (const FileRecord& file : frame.files) add(file);
     }
     for (const FileRecord& file : run.run_files) add(file);
     if (!run.complete) {
         for (const LayerOptions& layer : run.scene.layers) names.insert("statistics/" + layer.name + ".csv");
     }
-    if (!recorded && has_density(run.scene))
+    if (!recorded)
         result.checks.push_back(
             {"digests", false, "the manifest, of an earlier version, has no checksums: run the scene anew"});
     std::vector<std::filesystem::path> extra;

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Fails when a folder includes what it may not, a header of another module is private, a public header drags a heavy
-one along, or a source file lacks its licence line, or specialises a function template that no header declares so. The
-rules are the tables below; the root of the source tree is the argument. With --self-test the checker itself is tested:
-it must see each kind of offence."""
+one along, two headers have a type of one name, or a source file lacks its licence line or specialises a function
+template that no header declares so. The rules are the tables below; the root of the source tree is the argument. With
+--self-test the checker itself is tested: it must see each kind of offence."""
 
 import functools
 import pathlib
@@ -76,6 +76,7 @@ LIBRARIES = {
 HEAVY = ("openvdb/", "nanovdb/", "vulkan/")
 SOURCES = {".h", ".cpp", ".vert", ".frag", ".comp", ".glsl", ".py", ".sh"}
 SPECIALISATION = re.compile(r"^template <>\n[^;{]*?(\w+<[\w:]+>)\(", re.MULTILINE)
+NAMESPACE_OR_TYPE = re.compile(r"^(?:namespace ([\w:]+) \{|(?:struct|class|enum class|enum|union) (\w+)(?!\w|::)[^;{]*\{)", re.MULTILINE)
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
@@ -170,9 +171,26 @@ def problems_of(root, file):
             yield f"line {number}: {name} is too heavy for a public header"
 
 
+def types_of_one_name(files):
+    """A problem for each type of a header that another header has in the same namespace: a program with both is none, whatever
+    the compiler makes of it."""
+    first = {}
+    for file in files:
+        if file.suffix != ".h":
+            continue
+        namespace, text = "", file.read_text(encoding="utf-8")
+        for match in NAMESPACE_OR_TYPE.finditer(text):
+            if match.group(1):
+                namespace = match.group(1)
+            elif first.setdefault((namespace, match.group(2)), file) != file:
+                yield file, (f"line {text[:match.start()].count(chr(10)) + 1}: {namespace}::{match.group(2)} is the name of a type of "
+                             f"{first[namespace, match.group(2)].name}, too")
+
+
 def problems(root):
     files = sorted({file for module in MAY_USE for file in (root / module).rglob("*") if file.suffix in SOURCES})
-    return files, [f"{file.relative_to(root)}: {problem}" for file in files for problem in problems_of(root, file)]
+    found = [(file, problem) for file in files for problem in problems_of(root, file)]
+    return files, [f"{file.relative_to(root)}: {problem}" for file, problem in [*found, *types_of_one_name(files)]]
 
 
 def self_test():
@@ -195,12 +213,15 @@ def self_test():
         "render/cpu/view.h": licence + '#include "render/vulkan/lists.h"\n',
         "render/vulkan/lists.h": licence + '#include "render/cloud/splats.h"\n',
         "render/bare.cpp": "int x;\n",
+        "core/type.h": licence + "namespace a {\nenum class Access {\n",
+        "core/type_of_b.h": licence + "namespace b {\nclass Access {\n",
+        "core/type_again.h": licence + "struct Access;\nnamespace a {\nstruct Access : Base {\n",
         "core/made.h": licence + "template <>\nint made<float>();\n",
         "core/made.cpp": licence + "template <>\nint made<float>() {}\n",
         "core/hidden.cpp": licence + "template <>\nint a::made<double>() {}\n",
     }
     expected = {"core/up.h", "automaton/automaton.h", "automaton/heavy.h", "automaton/step.cpp",
-                "render/cloud/splats.h", "render/cpu/view.h", "render/bare.cpp", "core/hidden.cpp"}
+                "render/cloud/splats.h", "render/cpu/view.h", "render/bare.cpp", "core/hidden.cpp", "core/type_again.h"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for module in MAY_USE:

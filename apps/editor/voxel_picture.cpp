@@ -32,7 +32,7 @@ struct Hit {
 // Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing", 1987: cell after cell along the ray.
 class CellWalk {
   public:
-    CellWalk(const VoxelLattice& lattice, const VoxelStyle& style, const CameraFrame& axes, double pixel)
+    CellWalk(const CellLattice& lattice, const VoxelStyle& style, const CameraFrame& axes, double pixel)
         : lattice_(lattice), style_(style), pixel_(pixel) {
         const Extent& cells = lattice.cld.extent;
         const double edge = lattice.placement.cell_size_m;
@@ -115,7 +115,7 @@ class CellWalk {
         return out;
     }
 
-    const VoxelLattice& lattice_;
+    const CellLattice& lattice_;
     const VoxelStyle& style_;
     double pixel_;  // of the picture at distance 1
     Vec3 low_{}, high_{}, eye_{};  // in cells
@@ -139,8 +139,8 @@ Picture empty_picture(const Camera& camera) {
     return picture;
 }
 
-std::vector<VoxelLattice> lattices_of(const Scene& scene, const FrameResult& frame) {
-    std::vector<VoxelLattice> out;
+std::vector<CellLattice> lattices_of(const Scene& scene, const FrameResult& frame) {
+    std::vector<CellLattice> out;
     if (frame.layers.empty() && frame.hum) out.push_back({*frame.hum, *frame.act, *frame.cld, scene.automaton.placement});
     for (std::size_t n = 0; n < frame.layers.size() && n < scene.layers.size(); ++n) {
         const LayerFrame& layer = frame.layers[n];
@@ -151,12 +151,12 @@ std::vector<VoxelLattice> lattices_of(const Scene& scene, const FrameResult& fra
 
 }  // namespace
 
-void draw_voxels(Picture& picture, const Camera& camera, std::span<const VoxelLattice> lattices,
+void draw_voxels(Picture& picture, const Camera& camera, std::span<const CellLattice> lattices,
                  const VoxelStyle& style) {
     const CameraFrame axes = camera_frame(camera);
     const double pixel = 2 * axes.half_height / camera.height;
     std::vector<CellWalk> walks;
-    for (const VoxelLattice& lattice : lattices) walks.emplace_back(lattice, style, axes, pixel);
+    for (const CellLattice& lattice : lattices) walks.emplace_back(lattice, style, axes, pixel);
     tbb::parallel_for(0, picture.height, [&](int y) {
         for (int x = 0; x < picture.width; ++x) {
             const std::size_t at = std::size_t(y) * std::size_t(picture.width) + std::size_t(x);
@@ -186,7 +186,7 @@ std::vector<WorldLine> billboard_lines(const DrawnClouds& clouds, const Camera& 
 
 Picture voxel_picture(const Scene& scene, const FrameResult& frame, const Camera& camera, const VoxelStyle& style) {
     Picture picture = empty_picture(camera);
-    const std::vector<VoxelLattice> lattices = lattices_of(scene, frame);
+    const std::vector<CellLattice> lattices = lattices_of(scene, frame);
     draw_voxels(picture, camera, lattices, style);
     RenderOptions options = scene.render;
     options.camera = camera;

@@ -16,7 +16,7 @@
 namespace nephos {
 
 // The cells of a lattice.
-struct VoxelLattice {
+struct CellLattice {
     BitPlaneView hum, act, cld;
     Placement placement;
 };
@@ -31,7 +31,7 @@ struct VoxelStyle {
 // Adds the cubes of all lattices to a picture of linear colours; depth_m, which decides what hides what, holds infinity or
 // distances of what was drawn before. The nearest cube of a pixel counts; of a cell with several bits cld before act before
 // hum. Boundaries are open. Parallel; the same bits for any number of threads.
-void draw_voxels(Picture& picture, const Camera& camera, std::span<const VoxelLattice> lattices,
+void draw_voxels(Picture& picture, const Camera& camera, std::span<const CellLattice> lattices,
                  const VoxelStyle& style);
 
 // Returns the frames of billboards as they face the camera.

@@ -153,8 +153,8 @@ GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t h
 
 namespace {
 
-void barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& before,
-             const Access& after, vk::ImageLayout old_layout) {
+void barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const GpuAccess& before,
+             const GpuAccess& after, vk::ImageLayout old_layout) {
     const vk::ImageMemoryBarrier2 change(before.stages, before.kinds, after.stages, after.kinds, old_layout,
                                          vk::ImageLayout::eGeneral, VK_QUEUE_FAMILY_IGNORED,
                                          VK_QUEUE_FAMILY_IGNORED, *image.image, all_of(image));
@@ -163,17 +163,17 @@ void barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, con
 
 }  // namespace
 
-void begin_image(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& after) {
+void begin_image(const vk::raii::CommandBuffer& commands, const GpuImage& image, const GpuAccess& after) {
     barrier(commands, image, {after.stages, {}}, after, vk::ImageLayout::eUndefined);
 }
 
-void image_barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& before,
-                   const Access& after) {
+void image_barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const GpuAccess& before,
+                   const GpuAccess& after) {
     barrier(commands, image, before, after, vk::ImageLayout::eGeneral);
 }
 
-void buffer_barrier(const vk::raii::CommandBuffer& commands, const GpuBuffer& buffer, const Access& before,
-                    const Access& after) {
+void buffer_barrier(const vk::raii::CommandBuffer& commands, const GpuBuffer& buffer, const GpuAccess& before,
+                    const GpuAccess& after) {
     const vk::BufferMemoryBarrier2 change(before.stages, before.kinds, after.stages, after.kinds,
                                           VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED, *buffer.buffer, 0,
                                           VK_WHOLE_SIZE);

@@ -66,35 +66,35 @@ GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t h
                       vk::Format format, vk::ImageUsageFlags usage, std::uint32_t levels = 1);
 
 // One side of a dependency.
-struct Access {
+struct GpuAccess {
     vk::PipelineStageFlags2 stages;
     vk::AccessFlags2 kinds;
 };
 
 namespace access {
-inline constexpr Access none{vk::PipelineStageFlagBits2::eNone, {}};
-inline constexpr Access draw{
+inline constexpr GpuAccess none{vk::PipelineStageFlagBits2::eNone, {}};
+inline constexpr GpuAccess draw{
     vk::PipelineStageFlagBits2::eColorAttachmentOutput,
     vk::AccessFlagBits2::eColorAttachmentRead | vk::AccessFlagBits2::eColorAttachmentWrite};
-inline constexpr Access sample{vk::PipelineStageFlagBits2::eVertexShader |
-                                   vk::PipelineStageFlagBits2::eFragmentShader |
-                                   vk::PipelineStageFlagBits2::eComputeShader,
-                               vk::AccessFlagBits2::eShaderSampledRead};
-inline constexpr Access copy_from{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferRead};
-inline constexpr Access copy_to{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferWrite};
-inline constexpr Access compute{
+inline constexpr GpuAccess sample{vk::PipelineStageFlagBits2::eVertexShader |
+                                      vk::PipelineStageFlagBits2::eFragmentShader |
+                                      vk::PipelineStageFlagBits2::eComputeShader,
+                                  vk::AccessFlagBits2::eShaderSampledRead};
+inline constexpr GpuAccess copy_from{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferRead};
+inline constexpr GpuAccess copy_to{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferWrite};
+inline constexpr GpuAccess compute{
     vk::PipelineStageFlagBits2::eComputeShader,
     vk::AccessFlagBits2::eShaderStorageRead | vk::AccessFlagBits2::eShaderStorageWrite};
-inline constexpr Access host{vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead};
+inline constexpr GpuAccess host{vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead};
 }  // namespace access
 
 // Transitions an image from UNDEFINED to GENERAL and discards its content.
-void begin_image(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& after);
+void begin_image(const vk::raii::CommandBuffer& commands, const GpuImage& image, const GpuAccess& after);
 // Makes the accesses `before` to an image complete and visible to those `after`.
-void image_barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& before,
-                   const Access& after);
-void buffer_barrier(const vk::raii::CommandBuffer& commands, const GpuBuffer& buffer, const Access& before,
-                    const Access& after);
+void image_barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const GpuAccess& before,
+                   const GpuAccess& after);
+void buffer_barrier(const vk::raii::CommandBuffer& commands, const GpuBuffer& buffer, const GpuAccess& before,
+                    const GpuAccess& after);
 // Replaces the content of an image by texels, tightly packed, first of all layers of level 0, then of level 1, and so on;
 // waits until shaders can sample it.
 void upload_image(const GpuDevice& gpu, const GpuImage& image, std::span<const std::byte> texels);

@@ -169,6 +169,10 @@ class Faults(Case):
         self.assertIn("tiny_0002.vdb: cannot read", result.stdout)
         # Nor of another run that is compared with, which alone is no verdict.
         self.call("run", self.scene, "--no-render", "--out", "other")
+        said = self.call("verify", "out", "--against", "other", "--hashes", status=1,
+                         env=self.failing("stat EIO 1 1000", "other/manifest.json")).stdout
+        self.assertIn("FAIL  hashes    density/tiny_0003.vdb: 7 bytes, not", said)
+        self.assertIn("none  against   other/manifest.json: cannot", said)
         for name in ("other/statistics.csv", "other/manifest.json"):
             with self.subTest(name):
                 env = self.failing("read EIO 1 1000", name)

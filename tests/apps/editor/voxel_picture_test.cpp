@@ -27,7 +27,7 @@ struct TestCells {
                         if (random() % 30 == 0) plane->row(j, k)[i / 64] |= std::uint64_t{1} << (i % 64);
         }
     }
-    VoxelLattice lattice() const { return {hum.view(), act.view(), cld.view(), placement}; }
+    CellLattice lattice() const { return {hum.view(), act.view(), cld.view(), placement}; }
     bool is_there(const Vec3& at_m, const VoxelStyle& style) const {
         const Vec3 at = (1 / placement.cell_size_m) * (at_m - placement.origin_m);
         const int i = int(std::floor(at.x)), j = int(std::floor(at.y)), k = int(std::floor(at.z));
@@ -51,7 +51,7 @@ double marched(const TestCells& cells, const VoxelStyle& style, const Vec3& from
 TEST(VoxelPicture, ShowsTheFirstCellOfEachRay) {
     const unsigned seed = 6;
     const TestCells cells(seed);
-    const VoxelLattice lattice = cells.lattice();
+    const CellLattice lattice = cells.lattice();
     Camera camera;
     camera.width = 20;
     camera.height = 15;
@@ -91,7 +91,7 @@ TEST(VoxelPicture, ShowsTheFirstCellOfEachRay) {
 // What was drawn before hides cells behind it.
 TEST(VoxelPicture, NearerThingsHideCells) {
     const TestCells cells(7);
-    const VoxelLattice lattice = cells.lattice();
+    const CellLattice lattice = cells.lattice();
     Camera camera;
     camera.width = camera.height = 9;
     camera.position_m = {30, -900, 1105};
