@@ -56,7 +56,7 @@ LEAF = "render/shared/"
 LIBRARIES = {
     "openvdb/": {"density"},
     "nanovdb/": {"density"},
-    "zlib.h": {"density", "study"},
+    "zlib.h": {"density", "render", "study"},
     "vulkan/": {"render", "apps/editor"},
     "GLFW/": {"apps/editor"},
     "imgui": {"apps/editor"},

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -21,143 +22,54 @@
 #include <unistd.h>
 
 #include "density/vdb/sandbox.h"
+#include "render/image/exr_head.h"
+#include "render/image/exr_packed.h"
 
 namespace nephos {
 namespace {
 
 // Holds the file while the library reads it by the functions below, which C calls.
-struct Source {
-    int fd = -1;
-    std::uint64_t size = 0;
-    int failure = 0;  // errno of a read
+struct Reading {
+    ExrSource source;
     bool has_head = false;
-    char message[300] = "";
+    bool lacks_memory = false;
+    std::string message;
 };
-
-// Reads up to `size` bytes from a place on, fewer at the end of the file. Returns how many, or -1.
-std::int64_t read_at(Source& source, void* to, std::uint64_t size, std::uint64_t from) {
-    if (from >= source.size) return 0;
-    std::uint64_t done = 0;
-    while (done < size) {
-        const ssize_t got =
-            ::pread(source.fd, static_cast<char*>(to) + done, size - done, off_t(from + done));
-        if (got < 0 && errno == EINTR) continue;
-        if (got < 0) source.failure = errno;
-        if (got < 0) return -1;
-        if (got == 0) break;
-        done += std::uint64_t(got);
-    }
-    return std::int64_t(done);
-}
 
 std::int64_t read_part(exr_const_context_t, void* user, void* to, std::uint64_t size, std::uint64_t from,
                        exr_stream_error_func_ptr_t) {
-    return read_at(*static_cast<Source*>(user), to, size, from);
+    return read_exr_bytes(static_cast<Reading*>(user)->source, to, size, from);
 }
 
 std::int64_t size_of(exr_const_context_t, void* user) {
-    return std::int64_t(static_cast<Source*>(user)->size);
+    return std::int64_t(static_cast<Reading*>(user)->source.size);
 }
 
-void keep_message(exr_const_context_t file, exr_result_t, const char* text) {
+// Of the head all count, as the library goes over the first ones; of chunks the first says most.
+void keep_message(exr_const_context_t file, exr_result_t result, const char* text) {
+    constexpr std::size_t kMost = 300;
     void* user = nullptr;
     if (exr_get_user_data(file, &user) != EXR_ERR_SUCCESS || user == nullptr) return;
-    auto* source = static_cast<Source*>(user);
-    // Of the head the last one ended it, as others are gone over; of chunks the first says most.
-    if (source->has_head && source->message[0] != '\0') return;
-    std::strncpy(source->message, text, sizeof source->message - 1);
+    auto& reading = *static_cast<Reading*>(user);
+    if (result == EXR_ERR_OUT_OF_MEMORY) reading.lacks_memory = true;
+    if (reading.message.size() > kMost || (reading.has_head && !reading.message.empty())) return;
+    try {
+        if (!reading.message.empty()) reading.message += "; ";
+        reading.message.append(text, std::min(std::strlen(text), kMost));
+    } catch (const std::bad_alloc&) {
+        reading.lacks_memory = true;
+    }
 }
 
-[[noreturn]] void throw_failure(int failure) {
-    throw std::runtime_error(std::string(kCannotRead) + std::strerror(failure));
-}
-
-// Goes over the head of a file.
-class HeadBytes {
-  public:
-    explicit HeadBytes(Source& source) : source_(source) {}
-
-    char next() {
-        if (at_ - begin_ >= filled_) fill();
-        return buffer_[at_++ - begin_];
-    }
-    std::uint32_t number() {
-        std::uint32_t value = 0;
-        for (int n = 0; n < 4; ++n) value |= std::uint32_t(std::uint8_t(next())) << (8 * n);
-        return value;
-    }
-    std::string text() {
-        std::string found;
-        while (const char c = next()) {
-            found += c;
-            if (found.size() > 255) throw std::runtime_error("its head has a name of more than 255 bytes");
-        }
-        return found;
-    }
-    void skip(std::uint32_t bytes) { at_ += bytes; }
-
-  private:
-    void fill() {
-        const std::int64_t got = read_at(source_, buffer_.data(), buffer_.size(), at_);
-        if (got < 0) throw_failure(source_.failure);
-        if (got == 0) throw std::runtime_error("it ends early");
-        begin_ = at_;
-        filled_ = std::uint64_t(got);
-    }
-
-    Source& source_;
-    std::array<char, 4096> buffer_{};
-    std::uint64_t at_ = 0, begin_ = 0, filled_ = 0;
-};
-
-// Throws unless the head of the first part has what its pixels are read by, once each and as the format says: for what lacks,
-// or is of another type, the library takes something else without a word, as ZIP for the compression.
-void require_head(Source& source) {
-    constexpr std::uint32_t kMagic = 20000630, kDeep = 1u << 11;
-    struct Attribute {
-        std::string_view name, type;
-        std::uint32_t size;  // 0: any
-        int count = 0;
+std::string text_of(const std::array<std::int32_t, 4>& window) {
+    const auto corner = [&](std::size_t n) {
+        return "(" + std::to_string(window[n]) + " " + std::to_string(window[n + 1]) + ")";
     };
-    std::array<Attribute, 4> needed{{{"channels", "chlist", 0},
-                                     {"compression", "compression", 1},
-                                     {"dataWindow", "box2i", 16},
-                                     {"displayWindow", "box2i", 16}}};
-    HeadBytes head(source);
-    if (head.number() != kMagic) throw std::runtime_error("it is no EXR file");
-    if ((head.number() & kDeep) != 0) throw std::runtime_error("it holds deep data");
-    for (std::string name; !(name = head.text()).empty();) {
-        const std::string type = head.text();
-        std::uint32_t size = head.number();
-        const auto found = std::ranges::find(needed, name, &Attribute::name);
-        if (found != needed.end()) {
-            if (type != found->type || (found->size != 0 && size != found->size))
-                throw std::runtime_error("its " + name + " is not of the type " + std::string(found->type));
-            if (++found->count > 1) throw std::runtime_error("its head has two of " + name);
-            if (name == "compression") {
-                const auto value = std::uint8_t(head.next());
-                if (value >= EXR_COMPRESSION_LAST_TYPE)
-                    throw std::runtime_error("its compression is " + std::to_string(value) +
-                                             ", which is none");
-                --size;
-            }
-        }
-        head.skip(size);
-    }
-    for (const Attribute& attribute : needed)
-        if (attribute.count == 0) throw std::runtime_error("its head has no " + std::string(attribute.name));
+    return corner(0) + " to " + corner(2);
 }
 
-std::string text_of(const exr_attr_box2i_t& window) {
-    const auto corner = [](const exr_attr_v2i_t& at) {
-        return "(" + std::to_string(at.x) + " " + std::to_string(at.y) + ")";
-    };
-    return corner(window.min) + " to " + corner(window.max);
-}
-
-bool operator==(const exr_attr_box2i_t& a, const exr_attr_box2i_t& b) {
-    return std::pair(a.min.x, a.min.y) == std::pair(b.min.x, b.min.y) &&
-           std::pair(a.max.x, a.max.y) == std::pair(b.max.x, b.max.y);
+std::array<std::int32_t, 4> numbers_of(const exr_attr_box2i_t& window) {
+    return {window.min.x, window.min.y, window.max.x, window.max.y};
 }
 
 // How much a channel of this name is expected to hold heights; 0: it is not.
@@ -191,39 +103,34 @@ void copy_row(const std::uint8_t* from, exr_pixel_type_t type, float* to, int co
 class Part {
   public:
     explicit Part(int fd) {
-        source_.fd = fd;
+        ExrSource& source = reading_.source;
+        source.fd = fd;
         const off_t size = ::lseek(fd, 0, SEEK_END);
-        if (size < 0) throw_failure(errno);
-        source_.size = std::uint64_t(size);
-        require_head(source_);
+        if (size < 0) throw_exr_failure(errno);
+        source.size = std::uint64_t(size);
+        head_ = read_exr_head(source);
         exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
-        options.user_data = &source_;
+        options.user_data = &reading_;
         options.read_fn = read_part;
         options.size_fn = size_of;
         options.error_handler_fn = keep_message;
         require(exr_start_read(&file_, "heights", &options));
-        source_.has_head = true;
-        source_.message[0] = '\0';
     }
     Part(const Part&) = delete;
     Part& operator=(const Part&) = delete;
     ~Part() { exr_finish(&file_); }
 
     ExrGrid read(int most) {
-        exr_storage_t storage{};
-        exr_attr_box2i_t display{};
-        require(exr_get_storage(file_, 0, &storage));
-        require(exr_get_data_window(file_, 0, &window_));
-        require(exr_get_display_window(file_, 0, &display));
-        require(exr_get_compression(file_, 0, &compression_));
+        require_same_head();
+        require_rows_or_tiles();
         const long long columns = 1LL + window_.max.x - window_.min.x,
                         rows = 1LL + window_.max.y - window_.min.y;
         if (columns < 2 || rows < 2 || columns > most || rows > most)
             throw std::runtime_error("it is " + std::to_string(columns) + " x " + std::to_string(rows) +
                                      " heights; expected 2 to " + std::to_string(most) + " on a side");
-        if (!(display == window_))
-            throw std::runtime_error("its data window is " + text_of(window_) + ", its display window " +
-                                     text_of(display) +
+        if (head_.data_window != head_.display_window)
+            throw std::runtime_error("its data window is " + text_of(head_.data_window) +
+                                     ", its display window " + text_of(head_.display_window) +
                                      "; expected the same, a height in each pixel of the map");
         choose_channel();
         if (compression_ == EXR_COMPRESSION_DWAA || compression_ == EXR_COMPRESSION_DWAB)
@@ -231,7 +138,7 @@ class Part {
                 "its compression is DWA, of which damage goes unnoticed; expected another one, as ZIP");
         grid_ = {int(columns), int(rows), {}};
         grid_.values.resize(std::size_t(columns) * std::size_t(rows));
-        if (storage == EXR_STORAGE_TILED)
+        if (storage_ == EXR_STORAGE_TILED)
             read_tiles();
         else
             read_rows();
@@ -242,12 +149,47 @@ class Part {
   private:
     void require(exr_result_t result) const {
         if (result == EXR_ERR_SUCCESS) return;
-        if (source_.failure != 0) throw_failure(source_.failure);
+        if (reading_.source.failure != 0) throw_exr_failure(reading_.source.failure);
         // Some decompressors call damage so.
-        const bool is_damage = std::string_view(source_.message).starts_with("Unable to decompress");
+        const bool is_damage = reading_.message.starts_with("Unable to decompress");
         if (result == EXR_ERR_OUT_OF_MEMORY && !is_damage) throw std::bad_alloc();
-        throw std::runtime_error(source_.message[0] != '\0' ? source_.message
-                                                            : exr_get_default_error_message(result));
+        throw std::runtime_error(reading_.message.empty() ? exr_get_default_error_message(result)
+                                                          : reading_.message);
+    }
+
+    // The library has gone over what failed while it read the head.
+    void require_same_head() {
+        if (reading_.source.failure != 0) throw_exr_failure(reading_.source.failure);
+        if (reading_.lacks_memory) throw std::bad_alloc();
+        exr_attr_box2i_t display{};
+        require(exr_get_storage(file_, 0, &storage_));
+        require(exr_get_data_window(file_, 0, &window_));
+        require(exr_get_display_window(file_, 0, &display));
+        require(exr_get_compression(file_, 0, &compression_));
+        if (int(compression_) != head_.compression || numbers_of(window_) != head_.data_window ||
+            numbers_of(display) != head_.display_window)
+            throw std::runtime_error("its head is damaged" +
+                                     (reading_.message.empty() ? "" : ": " + reading_.message));
+        reading_.has_head = true;
+        reading_.message.clear();
+    }
+
+    void require_rows_or_tiles() {
+        int parts = 0;
+        require(exr_get_count(file_, &parts));
+        for (int n = 0; n < parts; ++n) {
+            exr_storage_t storage{};
+            require(exr_get_storage(file_, n, &storage));
+            if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED)
+                throw std::runtime_error("it holds deep data");
+        }
+        const exr_attribute_t* tiles = nullptr;
+        if (storage_ == EXR_STORAGE_SCANLINE &&
+            exr_get_attribute_by_name(file_, 0, "tiles", &tiles) == EXR_ERR_SUCCESS && tiles != nullptr)
+            throw std::runtime_error(
+                "its rows have an attribute `tiles`, by which OpenEXR 3.1 counts them as tiles: leave that "
+                "out");
+        reading_.message.clear();
     }
 
     // The only channel, or of several the one named as a height.
@@ -302,7 +244,8 @@ class Part {
     // Puts the heights of a chunk into the grid, from this column and row on.
     void read_chunk(const exr_chunk_info_t& chunk, int column, int row) {
         if (chunk.packed_size == 0) throw std::runtime_error("a chunk of its pixels is empty");
-        places_.emplace_back(chunk.data_offset, chunk.data_offset + chunk.packed_size);
+        const std::uint64_t before = (storage_ == EXR_STORAGE_TILED ? 20 : 8) + (head_.is_multipart ? 4 : 0);
+        places_.emplace_back(chunk.data_offset - before, chunk.data_offset + chunk.packed_size);
         // One that did not become smaller is stored as it is.
         const bool is_raw = chunk.packed_size == chunk.unpacked_size;
         if (!is_raw && (compression_ == EXR_COMPRESSION_NONE || chunk.packed_size > chunk.unpacked_size))
@@ -321,6 +264,7 @@ class Part {
             nullptr;  // what it chooses for one of several channels writes them all
         if (is_raw) pipeline.decompress_fn = nullptr;  // which does not know such chunks of B44
         require(exr_decoding_run(file_, 0, &pipeline));
+        if (!is_raw) require_all_used(pipeline, compression_);
         copy_heights(pipeline, column, row);
     }
 
@@ -350,21 +294,49 @@ class Part {
         if (left > 0) throw short_chunk();
     }
 
-    // A size with one other bit may be that of raw pixels, which the next chunk then gives.
+    // A size with one other bit may be that of raw pixels, which the next chunk then gives: also of another part or level.
     void require_apart() {
+        const auto fail = [] { throw std::runtime_error("two chunks of its pixels share bytes"); };
         std::ranges::sort(places_);
         for (std::size_t n = 1; n < places_.size(); ++n)
-            if (places_[n].first < places_[n - 1].second)
-                throw std::runtime_error("two chunks of its pixels share bytes");
+            if (places_[n].first < places_[n - 1].second) fail();
+        for (const std::uint64_t begin : table()) {
+            const auto after = std::ranges::upper_bound(places_, begin, {}, &Place::first);
+            if (after == places_.begin()) continue;
+            const Place& place = *std::prev(after);
+            if (begin > place.first && begin < place.second) fail();
+        }
     }
 
-    Source source_;
+    // The places of all chunks, as the file has them.
+    std::vector<std::uint64_t> table() {
+        int parts = 0;
+        std::uint64_t chunks = 0;
+        require(exr_get_count(file_, &parts));
+        for (int n = 0; n < parts; ++n) {
+            std::int32_t count = 0;
+            require(exr_get_chunk_count(file_, n, &count));
+            chunks += std::uint64_t(std::max(count, 0));
+        }
+        if (chunks > reading_.source.size / 8) throw std::runtime_error("it ends early");
+        std::vector<std::uint64_t> places(chunks);
+        const std::int64_t got = read_exr_bytes(reading_.source, places.data(), 8 * chunks, head_.table_at);
+        if (got < 0) throw_exr_failure(reading_.source.failure);
+        if (std::uint64_t(got) < 8 * chunks) throw std::runtime_error("it ends early");
+        return places;
+    }
+
+    using Place = std::pair<std::uint64_t, std::uint64_t>;  // of a chunk in the file: its head, its end
+
+    Reading reading_;
+    ExrHead head_;
     exr_context_t file_ = nullptr;
     exr_compression_t compression_ = EXR_COMPRESSION_NONE;
+    exr_storage_t storage_ = EXR_STORAGE_SCANLINE;
     exr_attr_box2i_t window_{};
     int channel_ = -1;
     ExrGrid grid_;
-    std::vector<std::pair<std::uint64_t, std::uint64_t>> places_;  // of chunks that were read, in the file
+    std::vector<Place> places_;  // of chunks that were read
 };
 
 }  // namespace

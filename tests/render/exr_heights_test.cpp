@@ -15,6 +15,7 @@
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfTileDescriptionAttribute.h>
 #include <OpenEXR/ImfTiledOutputFile.h>
 #include <OpenEXR/ImfVecAttribute.h>
 #include <gtest/gtest.h>
@@ -364,6 +365,115 @@ TEST(ExrHeightsOfChunks, ThatShareBytesAreDamage) {
     write(path, bytes);
     EXPECT_NE(reason_of(path).find("two chunks of its pixels share bytes"), std::string::npos)
         << reason_of(path);
+}
+
+// A chunk that reaches into the head of the next one alone.
+TEST(ExrHeightsOfChunks, ThatShareAHeadAreDamage) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    for (int columns = 8; columns < 200; ++columns) {
+        Imf::Header header(columns, 2);
+        header.compression() = Imf::ZIPS_COMPRESSION;
+        header.channels().insert("Z", Imf::Channel(Imf::HALF));
+        std::vector<Imath::half> values;
+        for (int n = 0; n < 2 * columns; ++n) values.emplace_back(float(n * n % 61));
+        Imf::FrameBuffer buffer;
+        buffer.insert(
+            "Z", Imf::Slice(Imf::HALF, reinterpret_cast<char*>(values.data()), 2, 2 * std::size_t(columns)));
+        {
+            Imf::OutputFile file(path.c_str(), header, 0);
+            file.setFrameBuffer(buffer);
+            file.writePixels(2);
+        }
+        std::string bytes = content(path);
+        const std::size_t size_at = place_at(bytes, table_of(bytes, 2)) + 4;
+        const std::uint32_t raw = 2 * std::uint32_t(columns), packed = number_at(bytes, size_at);
+        if (packed >= raw || packed + 8 < raw) continue;
+        bytes.replace(size_at, 4, number_bytes(raw, 4));
+        write(path, bytes);
+        EXPECT_NE(reason_of(path).find("two chunks of its pixels share bytes"), std::string::npos)
+            << reason_of(path);
+        return;
+    }
+    FAIL() << "no row of such a size";
+}
+
+// What follows may be of another level, which is not read.
+TEST(ExrHeightsOfChunks, ThatShareBytesWithAnotherLevelAreDamage) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    Imf::Header header = header_of(Imf::ZIP_COMPRESSION);
+    header.setTileDescription(Imf::TileDescription(kTile, kTile, Imf::MIPMAP_LEVELS));
+    const std::vector<float> values = heights();
+    {
+        Imf::TiledOutputFile file(path.c_str(), header, 0);
+        set_pixels(file, values);
+        for (int level = 0; level < file.numLevels(); ++level)
+            file.writeTiles(0, file.numXTiles(level) - 1, 0, file.numYTiles(level) - 1, level);
+    }
+    ASSERT_EQ(read_height_file(path, 0, 0).image.heights, values);
+    std::string bytes = content(path);
+    const std::uint32_t raw = 4 * (kColumns % kTile) * (kRows % kTile);
+    // The last of ten tiles of full size; five levels of 35 x 10, 17 x 5, ... pixels have 3, 2, 1, 1, 1 and 1.
+    std::size_t table = 8;
+    while (place_at(bytes, table) <= table || place_at(bytes, table) > table + 8 * 40) ++table;
+    const std::size_t size_at = place_at(bytes, table + 9 * 8) + 16;
+    ASSERT_LT(number_at(bytes, size_at), raw);
+    bytes.replace(size_at, 4, number_bytes(raw, 4));
+    write(path, bytes);
+    EXPECT_NE(reason_of(path).find("two chunks of its pixels share bytes"), std::string::npos)
+        << reason_of(path);
+}
+
+// A head that says of a channel beside the heights that it has fewer bytes than its pixels take.
+TEST(ExrHeightsOfChunks, OfMorePixelsThanTheirChannelsHaveAreDamage) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    for (const Imf::Compression compression :
+         {Imf::PXR24_COMPRESSION, Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION}) {
+        Imf::Header header = header_of(compression);
+        header.channels().insert("A", Imf::Channel(Imf::HALF));
+        const std::vector<float> values = heights();
+        std::vector<Imath::half> others;
+        for (std::size_t n = 0; n < values.size(); ++n) others.emplace_back(float(n * n % 61));
+        Imf::FrameBuffer buffer;
+        buffer.insert("A", Imf::Slice(Imf::HALF, reinterpret_cast<char*>(others.data()), 2, 2 * kColumns));
+        {
+            Imf::OutputFile file(path.c_str(), header, 0);
+            buffer.insert("Z",
+                          Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(values.data())),
+                                     sizeof(float), sizeof(float) * kColumns));
+            file.setFrameBuffer(buffer);
+            file.writePixels(kRows);
+        }
+        EXPECT_EQ(reason_of(path), "");
+        std::string bytes = content(path);
+        bytes[bytes.find(std::string("A\0\1", 3)) + 2 + 4 + 4] = 2;  // samples along x: one of two
+        write(path, bytes);
+        EXPECT_NE(reason_of(path).find("cannot read heights of OpenEXR: a chunk has other pixels"),
+                  std::string::npos)
+            << reason_of(path);
+    }
+}
+
+std::string renamed(const fs::path& path, const std::string& from, const std::string& to) {
+    std::string bytes = content(path);
+    bytes.replace(bytes.find(from + '\0'), from.size(), to);
+    write(path, bytes);
+    return reason_of(path);
+}
+
+TEST(ExrHeightsWithAttributes, OfOtherPixelsAreRefused) {
+    const TemporaryFolder folder;
+    const fs::path path = folder.path() / "a.exr";
+    Imf::Header deep = header_of(Imf::ZIPS_COMPRESSION), tiles = deep;
+    deep.insert("typo", Imf::StringAttribute("deepscanline"));
+    write_rows(path, deep);
+    const std::string reason = renamed(path, "typo", "type");
+    EXPECT_NE(reason.find("it holds deep data"), std::string::npos) << reason;
+    tiles.insert("tilez", Imf::TileDescriptionAttribute(Imf::TileDescription(8, 8)));
+    write_rows(path, tiles);
+    EXPECT_NE(renamed(path, "tilez", "tiles").find("its rows have an attribute `tiles`"), std::string::npos);
 }
 
 // Whatever the first part is.
