@@ -119,10 +119,10 @@ std::size_t compare_steps(const RunListing& run, const RunListing& other, Proble
     return steps;
 }
 
+// Checksums of voxels by path; that of a picture is empty.
 std::map<std::string, std::string> voxels_of(const ListedFrame& frame) {
     std::map<std::string, std::string> voxels;
-    for (const FileRecord& file : frame.files)
-        if (!file.voxels.empty()) voxels[file.path] = file.voxels;
+    for (const FileRecord& file : frame.files) voxels[file.path] = file.voxels;
     return voxels;
 }
 
@@ -150,14 +150,19 @@ std::size_t compare_frames(const RunListing& run, const RunListing& other, Probl
         }
         for (const auto& [path, voxels] : voxels_of(frame)) {
             const auto file = others.extract(path);
-            if (file.empty())
+            const bool is_listed = !file.empty();
+            if (voxels.empty() && (!is_listed || file.mapped().empty())) continue;
+            if (!is_listed)
                 problems.add(fmt::format("it has no {}", path));
+            else if (voxels.empty() || file.mapped().empty())
+                problems.add(path + ": a manifest has no checksum of its voxels: run its scene anew");
             else if (file.mapped() != voxels)
                 problems.add(path + ": other voxels");
             else
                 ++same;
         }
-        for (const auto& [path, voxels] : others) problems.add(fmt::format("it has {} besides", path));
+        for (const auto& [path, voxels] : others)
+            if (!voxels.empty()) problems.add(fmt::format("it has {} besides", path));
     }
     return same;
 }

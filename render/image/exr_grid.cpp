@@ -150,6 +150,7 @@ class Part {
     void require(exr_result_t result) const {
         if (result == EXR_ERR_SUCCESS) return;
         if (reading_.source.failure != 0) throw_exr_failure(reading_.source.failure);
+        if (!reading_.has_head && reading_.lacks_memory) throw std::bad_alloc();
         // Some decompressors call damage so.
         const bool is_damage = reading_.message.starts_with("Unable to decompress");
         if (result == EXR_ERR_OUT_OF_MEMORY && !is_damage) throw std::bad_alloc();

@@ -281,6 +281,19 @@ class Verify(Case):
         path.write_bytes(path.read_bytes().replace(b'"time_s"', b'"time_S"'))
         self.assertIn("the bytes of its manifest.json are not those that were written",
                       self.call("verify", "a", "--against", "b", "--hashes", status=1).stdout)
+        # Those of earlier versions have fewer checksums.
+        manifest = json.loads((self.folder / "a/manifest.json").read_text())
+        for key, says in (("voxels_xxh3", "density/tiny_0001.vdb: a manifest has no checksum of its voxels"),
+                          ("files", "a manifest of an earlier version has no checksums")):
+            shutil.rmtree(self.folder / "b")
+            shutil.copytree(self.folder / "a", self.folder / "b")
+            for frame in manifest["frames"]:
+                frame.pop(key, None)
+                for file in frame.get("files", []):
+                    file.pop(key, None)
+            (self.folder / "b/manifest.json").write_text(unsealed(manifest))
+            for one, other in (("a", "b"), ("b", "a")):
+                self.assertIn(says, self.call("verify", one, "--against", other, "--hashes", status=1).stdout)
         self.refused(2, "verify", "a", "--against", "nowhere", says="nowhere: is no folder of a run: it has no manifest.json")
 
     def test_against_a_run_with_other_files(self):
