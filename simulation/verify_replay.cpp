@@ -55,7 +55,7 @@ class Replay : public SimulationSink {
                 problems.add(fmt::format("{}: other voxels", file.path));
         }
     }
-    // What was compared, of frames that agree.
+    // Says what was compared, of frames that agree.
     std::string text() const {
         std::string text = fmt::format("{} frames simulated anew have the same states", count);
         if (files > 0) text += fmt::format(", and {} files of them the same voxels", files);

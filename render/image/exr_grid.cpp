@@ -45,7 +45,7 @@ std::int64_t size_of(exr_const_context_t, void* user) {
     return std::int64_t(static_cast<Reading*>(user)->source.size);
 }
 
-// Of the head all count, as the library goes over the first ones; of chunks the first says most.
+// Keeps all of the head, as the library goes over the first ones; of chunks the first says most.
 void keep_message(exr_const_context_t file, exr_result_t result, const char* text) {
     constexpr std::size_t kMost = 300;
     void* user = nullptr;
@@ -72,7 +72,7 @@ std::array<std::int32_t, 4> numbers_of(const exr_attr_box2i_t& window) {
     return {window.min.x, window.min.y, window.max.x, window.max.y};
 }
 
-// How much a channel of this name is expected to hold heights; 0: it is not.
+// Tells how much a channel of this name is expected to hold heights; 0: it is not.
 int rank_of(std::string_view name) {
     constexpr std::string_view kNames[] = {"R", "height", "Y", "Z"};
     const auto* found = std::ranges::find(kNames, name);

@@ -22,7 +22,7 @@ std::int64_t read_exr_bytes(ExrSource& source, void* to, std::uint64_t size, std
 // Throws std::runtime_error "cannot read: ..." with what the system says.
 [[noreturn]] void throw_exr_failure(int failure);
 
-// What the first part says of its pixels.
+// Holds what the first part says of its pixels.
 struct ExrHead {
     bool is_multipart = false;
     std::uint8_t compression = 0;                                 // a number of the format, below 10

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Whether packed pixels of OpenEXR are as many as they should be. Private to the module.
+// Checks that packed pixels of OpenEXR are as many as they should be. Private to the module.
 
 #include <OpenEXR/openexr.h>
 
