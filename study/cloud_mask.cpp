@@ -160,11 +160,13 @@ CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& o
     require_no_height(path, options);
     PngInput png(path, {.side = kMaxExtent, .pixels = kMostColumns});
     const Extent extent{png.width(), png.height(), 1};
-    const std::vector<std::uint8_t> grey = png.grey();
+    const double threshold = options.threshold.value_or(kGreyThreshold);
     CloudMasks masks{{}, size, size, {0}, options.boundaries, true, 0, {}};
-    masks.snapshots.push_back(plane_of(
-        extent, options.threshold.value_or(kGreyThreshold),
-        [&](int i, int j, int) { return double(grey[linear_index(extent, i, extent.y - 1 - j, 0)]); }));
+    BitPlane& plane = masks.snapshots.emplace_back(extent);
+    png.each_grey([&](std::size_t n, double grey) {
+        const int row = int(n / std::size_t(extent.x));
+        if (grey > threshold) plane.set(int(n % std::size_t(extent.x)), extent.y - 1 - row, 0, true);
+    });
     return masks;
 }
 

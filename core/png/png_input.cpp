@@ -269,13 +269,14 @@ void PngInput::decode(Use&& use) {
     });
 }
 
-std::vector<std::uint8_t> PngInput::grey() {
-    std::vector<std::uint8_t> pixels(std::size_t(width()) * std::size_t(height()));
+void PngInput::each_grey(const std::function<void(std::size_t, double)>& use) {
+    const unsigned most = decoder_->bytes == 1 ? 255 : 65535;
+    const bool is_srgb = !(decoder_->power > 0);
     decode([&](std::size_t n, const Pixel& pixel) {
-        pixels[n] =
-            pixel.is_grey() ? pixel.byte(pixel.codes[0]) : byte_of_light(pixel.luminance() * pixel.alpha);
+        const bool is_stored = is_srgb && pixel.is_grey() && pixel.alpha == 1;
+        use(n, is_stored ? 255.0 * pixel.codes[0] / most
+                         : 255 * double(encode_srgb(pixel.luminance() * pixel.alpha)));
     });
-    return pixels;
 }
 
 std::vector<std::uint8_t> PngInput::rgb() {

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -51,7 +52,8 @@ class PngInput {
     std::optional<std::string> text(const std::string& keyword) const;
 
     // Decodes the pixels, once, with one of these. Rows from the top. What is transparent is over black, mixed as light.
-    std::vector<std::uint8_t> grey();              // one a pixel: luminance (ITU-R BT.709), in sRGB
+    // Calls use(n, grey) of each: luminance (ITU-R BT.709) in sRGB, 0 to 255, not rounded.
+    void each_grey(const std::function<void(std::size_t, double)>& use);
     std::vector<std::uint8_t> rgb();               // three a pixel, sRGB
     std::vector<std::byte> samples();              // as stored, 16 bits in this machine's order
     std::vector<std::uint16_t> luminance_alpha();  // two a pixel, of 65,535: linear light times alpha, alpha

@@ -199,7 +199,7 @@ class TafReader {
             return;
         }
         TafPeriod period;
-        const TafPeriod& before = taf_.periods.back();
+        TafPeriod& before = taf_.periods.back();
         if (is_from(word)) {
             const int minute = number(word.substr(6, 2));
             at_ = first;
@@ -207,6 +207,10 @@ class TafReader {
                 fail("expected day, hour and minute of the change, such as FM211530");
             ++at_;
             const double moment_s = moment(word.substr(2, 4), minute);
+            if (before.change.starts_with("BECMG") && moment_s > before.from_s && moment_s < before.until_s) {
+                taf_.notes.push_back("`" + before.change + "` ends where `" + word + "` begins");
+                before.until_s = moment_s;
+            }
             // It may begin where the change before it has just ended.
             period.from_s = moment_s < before.until_s ? moment_s : std::max(moment_s - kRapid_s / 2, before.until_s);
             period.until_s = moment_s + kRapid_s / 2;

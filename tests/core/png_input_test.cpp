@@ -148,6 +148,16 @@ double luminance(const Pixel& p) {
     return 0.2126 * linear(p[0]) + 0.7152 * linear(p[1]) + 0.0722 * linear(p[2]);
 }
 
+std::vector<double> grey_of(const std::filesystem::path& path) {
+    PngInput png(path, {});
+    std::vector<double> grey;
+    png.each_grey([&](std::size_t n, double value) {
+        EXPECT_EQ(n, grey.size());
+        grey.push_back(value);
+    });
+    return grey;
+}
+
 class PngKinds : public testing::TestWithParam<Kind> {
   protected:
     void SetUp() override {
@@ -180,10 +190,10 @@ TEST_P(PngKinds, ColoursAreAsShown) {
 }
 
 TEST_P(PngKinds, GreyIsTheirLuminanceAsShown) {
-    const std::vector<std::uint8_t> grey = PngInput(path(), kLimits).grey();
+    const std::vector<double> grey = grey_of(path());
     ASSERT_EQ(grey.size(), source_.pixels.size());
     for (std::size_t n = 0; n < grey.size(); ++n)
-        EXPECT_NEAR(grey[n], 255 * coded(luminance(source_.pixels[n]) * source_.pixels[n][3]), 0.51) << n;
+        EXPECT_NEAR(grey[n], 255 * coded(luminance(source_.pixels[n]) * source_.pixels[n][3]), 0.01) << n;
 }
 
 TEST_P(PngKinds, LightIsLinear) {
@@ -217,7 +227,7 @@ INSTANTIATE_TEST_SUITE_P(All, PngKinds, testing::ValuesIn(all_kinds()),
 // Nothing, or why it is refused.
 std::string message_of(const std::filesystem::path& path, const PngLimits& limits) {
     try {
-        PngInput(path, limits).grey();
+        PngInput(path, limits).each_grey([](std::size_t, double) {});
     } catch (const Error& error) {
         EXPECT_EQ(error.code(), ErrorCode::io);
         return error.what();
@@ -273,10 +283,10 @@ TEST_F(PngFiles, MayBeNarrow) {
              {std::pair(1, 1), std::pair(1, 9), std::pair(9, 1), std::pair(4, 2)}) {
             const Kind kind{PNG_COLOR_TYPE_GRAY, 16, interlace, width, height};
             Source source = source_of(kind);
-            const std::vector<std::uint8_t> grey = PngInput(write(kind, source), kLimits).grey();
+            const std::vector<double> grey = grey_of(write(kind, source));
             ASSERT_EQ(grey.size(), source.pixels.size());
             for (std::size_t n = 0; n < grey.size(); ++n)
-                EXPECT_NEAR(grey[n], 255 * source.pixels[n][0], 0.51);
+                EXPECT_NEAR(grey[n], 255 * source.pixels[n][0], 1e-9);
         }
 }
 
@@ -310,7 +320,7 @@ TEST_F(PngFiles, PowersAreThoseOfTheFile) {
         source.gamma = gamma;
         const auto path = write(kind, source);
         const std::vector<std::uint16_t> light = PngInput(path, kLimits).luminance_alpha();
-        const std::vector<std::uint8_t> grey = PngInput(path, kLimits).grey();
+        const std::vector<double> grey = grey_of(path);
         for (std::size_t n = 0; n < source.pixels.size(); ++n) {
             const double code = source.pixels[n][0],
                          expected = power > 0 ? std::pow(code, power) : linear(code);
@@ -351,8 +361,7 @@ TEST_F(PngFiles, PixelsOfAnotherChecksumAreErrors) {
         const std::size_t at = whole.find("IDAT"), size = whole.size() - at - 4 - 4 - 12;
         const std::string head = whole.substr(0, at - 4), data = whole.substr(at + 4, size),
                           end = whole.substr(whole.size() - 12);
-        const std::vector<std::uint8_t> pixels =
-            PngInput(write(head + chunk_of("IDAT", data) + end), kLimits).grey();
+        const std::vector<double> pixels = grey_of(write(head + chunk_of("IDAT", data) + end));
         std::size_t refused = 0;
         for (std::size_t n = 0; n < size; ++n)
             for (const int bit : {0, 3, 6}) {
@@ -362,7 +371,7 @@ TEST_F(PngFiles, PixelsOfAnotherChecksumAreErrors) {
                 if (!message_of(path, kLimits).empty())
                     ++refused;
                 else  // what no pixel needs
-                    EXPECT_EQ(PngInput(path, kLimits).grey(), pixels) << n << ", " << bit;
+                    EXPECT_EQ(grey_of(path), pixels) << n << ", " << bit;
             }
         EXPECT_GT(refused, 3 * size - 10);
     }

@@ -111,7 +111,20 @@ void given_back(void* at) {
 // Looks for no leaks: what OpenVDB loses when it throws is none of ours.
 extern "C" const char* __asan_default_options() { return "detect_leaks=0"; }
 
-// Replaces those of the standard library, and with them the forms for arrays and those that do not throw.
+// Replaces all forms of the standard library but the aligned ones: a sanitizer has its own of each, which would meet ours.
 void* operator new(std::size_t size) { return nephos::fuzz::taken(size); }
+void* operator new[](std::size_t size) { return nephos::fuzz::taken(size); }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+    try {
+        return nephos::fuzz::taken(size);
+    } catch (const std::bad_alloc&) {
+        return nullptr;
+    }
+}
+void* operator new[](std::size_t size, const std::nothrow_t& none) noexcept {
+    return operator new(size, none);
+}
 void operator delete(void* at) noexcept { nephos::fuzz::given_back(at); }
+void operator delete[](void* at) noexcept { nephos::fuzz::given_back(at); }
 void operator delete(void* at, std::size_t) noexcept { nephos::fuzz::given_back(at); }
+void operator delete[](void* at, std::size_t) noexcept { nephos::fuzz::given_back(at); }

@@ -158,6 +158,9 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
             return json.loads(explained.stdout)
         found = periods("BECMG 2113/2115 BKN030 FM211500 30015KT 9999 SCT045")
         self.assertEqual([(p["from_s"], p["until_s"]) for p in found["periods"]], [(0, 0), (3600, 10800), (10800, 11400)])
+        found = periods("BECMG 2113/2116 BKN030 FM211500 30015KT 9999 SCT045")  # ends it
+        self.assertEqual([(p["from_s"], p["until_s"]) for p in found["periods"]], [(0, 0), (3600, 10800), (10800, 11400)])
+        self.assertIn("`BECMG 2113/2116` ends where `FM211500` begins", " ".join(found["notes"]))
         found = periods("BECMG 2113/2116 BKN030 BECMG 2115/2118 30015KT")
         self.assertEqual([(p["from_s"], p["until_s"]) for p in found["periods"]], [(0, 0), (3600, 14400), (14400, 21600)])
         self.assertIn("which it overlaps", " ".join(found["notes"]))

@@ -108,10 +108,12 @@ class Stats(Case):
         self.assertEqual((slab["seen_from_above"], slab["statistics"]["top_mean_m"]["mean"]), (False, 40))
 
     def test_pictures_of_sixteen_bits(self):
-        """The threshold is of what a picture shows, whatever its depth: 127 of 255."""
-        for value, cover in ((20000, 0), (32000, 0), (33500, 1)):
+        """The threshold is of what a picture shows, whatever its depth and not rounded: 127 of 255."""
+        for value, threshold, cover in ((20000, 127, 0), (32639, 127, 0), (32640, 127, 1), (33500, 127, 1), (100, 0, 1), (0, 0, 0),
+                                        (32760, 127.3, 1), (32760, 127.5, 0)):
             Image.fromarray(numpy.full((4, 4), value, dtype=numpy.uint16)).save(self.folder / "deep.png")
-            self.assertEqual(self.stats("deep.png", "--cell-size", "30")["statistics"]["cover"]["mean"], cover, value)
+            options = ("--cell-size", "30", *(("--threshold", str(threshold)) if threshold != 127 else ()))
+            self.assertEqual(self.stats("deep.png", *options)["statistics"]["cover"]["mean"], cover, (value, threshold))
 
     def test_interlaced_pictures_of_sixteen_bits(self):
         """By passes, libpng's simple reading mixes lines of 16 bits; edges at odd places show it."""
