@@ -143,11 +143,11 @@ std::size_t compare_frames(const RunListing& run, const RunListing& other, Probl
         if (found == frames.end()) continue;
         if (found->second->state_hash != frame.state_hash)
             problems.add(fmt::format("frame {}: another state", frame.number));
-        std::map<std::string, std::string> others = voxels_of(*found->second);
         if (is_unlisted(run, frame) || is_unlisted(other, *found->second)) {
             problems.add("a manifest of an earlier version has no checksums: run its scene anew");
             continue;
         }
+        std::map<std::string, std::string> others = voxels_of(*found->second);
         for (const auto& [path, voxels] : voxels_of(frame)) {
             const auto file = others.extract(path);
             const bool is_listed = !file.empty();

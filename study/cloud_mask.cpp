@@ -45,15 +45,12 @@ void require_no_height(const std::filesystem::path& path, const MaskOptions& opt
              "is a view from above without levels: leave out --level-height (level_height_m of a target)");
 }
 
-// `value(i, j, k)` is cloud where it is above the threshold.
-template <typename Value>
-BitPlane plane_of(const Extent& extent, double threshold, Value&& value) {
-    BitPlane plane(extent);
+// Makes each voxel cloud.
+void fill(BitPlane& plane) {
+    const Extent extent = plane.extent();
     for (int k = 0; k < extent.z; ++k)
         for (int j = 0; j < extent.y; ++j)
-            for (int i = 0; i < extent.x; ++i)
-                if (value(i, j, k) > threshold) plane.set(i, j, k, true);
-    return plane;
+            for (int i = 0; i < extent.x; ++i) plane.set(i, j, k, true);
 }
 
 // Transforms of files lose digits to where they are.
@@ -94,7 +91,7 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
                          "threshold of 0 or more",
                          loaded.negative, threshold));
     if (threshold < 0) {  // so that what is clear is cloud
-        plane = plane_of(extent, threshold, [](int, int, int) { return 0.0; });
+        fill(plane);
         return masks;
     }
     grid.visit_blocks([&](const VoxelBlock& block) {
