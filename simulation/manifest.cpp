@@ -31,6 +31,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr char kFormat[] = "nephos run";
 constexpr int kFormatVersion = 1;
 
 Json vector_json(const Vec3& v) { return {v.x, v.y, v.z}; }
@@ -229,7 +230,7 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
     const Scene& scene = settings.scene;
     const RunFolder folder{settings.folder, scene.name};
     Json json;
-    json["format"] = "nephos run";
+    json["format"] = kFormat;
     json["format_version"] = kFormatVersion;
     json["nephos_version"] = version();
     json["random_stream_version"] = kRandomStreamVersion;
@@ -369,7 +370,18 @@ auto with_manifest(const std::filesystem::path& path, const Read& read) {
     }
 }
 
+// Returns the format that a manifest names where it is none of a run.
+std::string foreign_format(const Json& json) {
+    if (!json.is_object() || !json.contains("format") || !json.at("format").is_string()) return {};
+    const auto format = json.at("format").get<std::string>();
+    return format == kFormat ? std::string() : shortened(format);
+}
+
 }  // namespace
+
+std::string foreign_format(const std::filesystem::path& path) {
+    return foreign_format(parsed_json(path, JsonLists::left_out));
+}
 
 std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& path) {
     return with_manifest(path, [&](const Json& json) {
@@ -428,9 +440,11 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
     // Lists are not needed here, and that of the frames may be very long.
     const Json json = parsed_json(path, JsonLists::left_out);
     try {
-        if (json.at("format") != "nephos run" || json.at("format_version") != kFormatVersion) {
+        if (const std::string format = foreign_format(json); !format.empty())
+            throw Error(ErrorCode::io, fmt::format("{}: is not a manifest of a run: it is that of a \"{}\"",
+                                                   path.string(), format));
+        if (json.at("format") != kFormat || json.at("format_version") != kFormatVersion)
             throw Error(ErrorCode::io, path.string() + ": is not a manifest of this version of nephos");
-        }
         EarlierRun run;
         run.complete = json.at("complete").get<bool>();
         run.name = json.at("scene").at("name").get<std::string>();

@@ -113,7 +113,11 @@ struct EarlierRun {
     std::optional<BranchPoint> branch;  // of a run that branched off another one
 };
 
-// Throws Error(io) when the file cannot be read or is no manifest.
+// Returns the format of a manifest that is of something else than a run, such as "nephos sweep", shortened and without control
+// characters; empty where it names none. Throws Error(io) as parsed_json().
+std::string foreign_format(const std::filesystem::path& path);
+
+// Throws Error(io) when the file cannot be read or is no manifest of a run.
 EarlierRun read_manifest(const std::filesystem::path& path);
 
 }  // namespace nephos

@@ -14,7 +14,9 @@ namespace nephos {
 struct FittedLayer {
     MetarLayer layer;
     double coverage = 1;  // the key that was chosen
-    double cover = 0;     // optical, in the first frame
+    double cover =
+        0;  // optical, in the first frame; in a forecast the mean over the time in which it is there
+    double least_cover = 0, most_cover = 0;  // of the moments of that mean
     int tries = 0;
 };
 
@@ -30,8 +32,9 @@ struct FittedScene {
 inline constexpr int kMostTries = 10;
 FittedScene fit_metar(const Metar& metar, const MetarSceneOptions& options);
 
-// The same for a forecast: each layer has the coverage that it gets in the report of the first period that has it. The sky
-// of a period is met as that of a report is; between periods layers come and go (LayerOptions::presence).
+// The same for a forecast: the cover of a layer is met on average over `kTafMoments` moments of the time in which it is there, as
+// clouds that drift through the scene's box make it now more, now less.
+inline constexpr int kTafMoments = 4;
 FittedScene fit_taf(const Taf& taf, const MetarSceneOptions& options);
 
 }  // namespace nephos

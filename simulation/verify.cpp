@@ -138,9 +138,14 @@ std::size_t compare_frames(const RunListing& run, const RunListing& other, Probl
     if (other.frames.size() != run.frames.size())
         problems.add(fmt::format("it has {} frames, not {}", other.frames.size(), run.frames.size()));
     std::size_t same = 0;
+    std::set<int> own;
     for (const ListedFrame& frame : run.frames) {
+        own.insert(frame.number);
         const auto found = frames.find(frame.number);
-        if (found == frames.end()) continue;
+        if (found == frames.end()) {
+            problems.add(fmt::format("it has no frame {}", frame.number));
+            continue;
+        }
         if (found->second->state_hash != frame.state_hash)
             problems.add(fmt::format("frame {}: another state", frame.number));
         if (is_unlisted(run, frame) || is_unlisted(other, *found->second)) {
@@ -164,17 +169,29 @@ std::size_t compare_frames(const RunListing& run, const RunListing& other, Probl
         for (const auto& [path, voxels] : others)
             if (!voxels.empty()) problems.add(fmt::format("it has {} besides", path));
     }
+    for (const auto& [number, frame] : frames)
+        if (!own.contains(number)) problems.add(fmt::format("it has frame {} besides", number));
     return same;
 }
 
-// Throws Error(usage) where there is none. One that cannot be looked at is told beside the other checks.
+// Throws Error(usage) where there is none, or that of something else than a run. One that cannot be looked at, or is damaged, is
+// told beside the other checks.
 void require_manifest(const std::filesystem::path& folder) {
+    const std::filesystem::path path = folder / "manifest.json";
+    std::string format;
     try {
-        if (is_there(folder / "manifest.json")) return;
-    } catch (const ReadFailure&) {
+        if (!is_there(path))
+            throw Error(ErrorCode::usage,
+                        folder.string() + ": is no folder of a run: it has no manifest.json");
+        format = foreign_format(path);
+    } catch (const Error& error) {
+        if (error.code() == ErrorCode::usage) throw;
         return;
     }
-    throw Error(ErrorCode::usage, folder.string() + ": is no folder of a run: it has no manifest.json");
+    if (!format.empty())
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: is no folder of a run: its manifest.json is that of a \"{}\"",
+                                folder.string(), format));
 }
 
 Check compare_runs(const RunListing& run, const std::filesystem::path& other_folder) {

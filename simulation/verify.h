@@ -31,10 +31,11 @@ struct VerifyOptions {
     // Frames to simulate anew and to compare, from the first on, by states and by voxels of files that are not refined; 0: none. It takes the files that the scene starts from, and
     // of a branch the checkpoint of the other run that it began with, both as they were.
     int replay = 0;
-    // The largest change of a voxel from frame to frame that passes; none: it is reported and always passes.
+    // The largest change of a voxel from frame to frame that passes; none: it is reported and always passes. Of the files of all
+    // layers together, or of those of each layer where the scene writes no others; likewise seams.
     std::optional<double> max_change;
-    // Makes a seam that shows (Seam::shows) a failure, also of an axis that is not periodic. Otherwise it is reported: of few
-    // planes with little cloud the roughest lies at the seam by chance.
+    // Makes a seam that shows (Seam::shows) a failure, in every frame, also of an axis that is not periodic. Otherwise that of the
+    // last frame is reported: of few planes with little cloud the roughest lies at the seam by chance.
     bool seam = false;
 };
 
@@ -46,7 +47,7 @@ struct Verification {
 };
 
 // Checks a run. Reads one frame after the other; keeps two. Throws Error(io) when its manifest cannot be read, and
-// Error(usage) when `against` has no manifest. Everything else that is wrong becomes a check that has not passed.
+// Error(usage) when `against` has no manifest of a run. Everything else that is wrong becomes a check that has not passed.
 Verification verify_run(const std::filesystem::path& folder, const VerifyOptions& options);
 
 // What a list of files says against what is there.

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <span>
 #include <utility>
 
@@ -15,7 +14,6 @@
 #include "density/combine.h"
 #include "density/vdb/vdb_file.h"
 #include "density/voxel_digest.h"
-#include "simulation/scene_place.h"
 #include "simulation/verify_motion.h"
 #include "simulation/verify_problems.h"
 
@@ -56,7 +54,12 @@ class Decoder {
         check_geometry(file, loaded.info);
     }
 
-    std::vector<Check> checks() const {
+    // Returns the checks of so many files. Where none of them could be decoded, only what is wrong with them is told.
+    std::vector<Check> checks(std::size_t files) const {
+        if (files > 0 && count_ == 0) {
+            if (voxels_.none()) return {};
+            return {voxels_.check("voxels", {})};
+        }
         return {voxels_.check("voxels",
                               fmt::format("{} density files decode to the voxels of the manifest", count_)),
                 values_.check("values", fmt::format("finite, 0 to {:.4g}", largest_)),
@@ -109,17 +112,6 @@ class Decoder {
     double largest_ = 0;
 };
 
-// Voxels that are compared one by one: as floats they take 1 GiB. Boxes between layers that lie far apart have many, and
-// hardly any with cloud.
-constexpr std::size_t kMostCompared = std::size_t(1) << 28;
-
-bool is_too_large(const DensityGrid& grid) { return grid.extent().cells() > kMostCompared; }
-
-std::string not_compared(const DensityGrid& grid) {
-    return fmt::format("not done: the box has {} voxels, of which at most {} are compared",
-                       grid.extent().cells(), kMostCompared);
-}
-
 // The density of layers must be that of the file of all together.
 void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
                     const std::vector<DensityGrid>& layers, const std::vector<Boundaries>& boundaries,
@@ -139,68 +131,45 @@ void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
                                  difference));
 }
 
-Check check_seams(const RunListing& run, const DensityGrid& grid, bool all) {
-    if (is_too_large(grid))
-        return {"seam", !all, not_compared(grid), {}, !all};  // asked for, it has not passed
-    const Vec3 period = period_m(run.scene, std::nullopt);
-    const std::vector<float> density = grid.to_dense();
-    Check check{"seam", true, {}};
-    const char* const names[] = {"x", "y"};
-    for (int axis = 0; axis < 2; ++axis) {
-        const Extent e = grid.extent();
-        if (!all && period[axis] == 0) continue;
-        const Seam seam = seam_of(density, e.x, e.y, e.z, axis);
-        check.passed = check.passed && !(all && seam.shows());
-        check.detail += fmt::format("{}{}: {:.3g} at the seam, at most {:.3g} inside, shows above {:.3g}{}",
-                                    check.detail.empty() ? "" : "; ", names[axis], seam.at_seam, seam.inside,
-                                    seam.limit, seam.shows() ? " (the seam shows)" : "");
-        check.figures.emplace_back(fmt::format("{}_seam", names[axis]), seam.at_seam);
-        check.figures.emplace_back(fmt::format("{}_inside", names[axis]), seam.inside);
-        check.figures.emplace_back(fmt::format("{}_limit", names[axis]), seam.limit);
-    }
-    if (check.detail.empty()) check.detail = "no axis repeats";
-    return check;
-}
-
 // Compares the files of each frame with each other and with those of the frame before.
 class Frames {
   public:
-    explicit Frames(const RunListing& run) : run_(run) {}
+    Frames(const RunListing& run, const VerifyOptions& options)
+        : run_(run), options_(options), sequences_(sequences_of(run, options.seam)) {}
 
     // `grids`: by their path in the folder, all that could be read of one frame; frames come in order.
-    void add(const ListedFrame& frame, std::map<std::string, DensityGrid> grids) {
-        if (grids.empty()) return;
+    void add(const ListedFrame& frame, const std::map<std::string, DensityGrid>& grids) {
         const RunFolder folder{run_.folder, run_.scene.name};
-        const auto find = [&](const std::filesystem::path& path) {
-            return grids.find(path.lexically_relative(run_.folder).generic_string());
+        const auto find = [&](const std::filesystem::path& path) -> const DensityGrid* {
+            const auto found = grids.find(path.lexically_relative(run_.folder).generic_string());
+            return found == grids.end() ? nullptr : &found->second;
         };
         std::vector<DensityGrid> layers;
         std::vector<Boundaries> boundaries;
         for (const LayerOptions& layer : run_.scene.layers) {
-            const auto found = find(folder.density(frame.number, layer.name));
-            if (found == grids.end()) continue;
-            layers.push_back(found->second);
+            const DensityGrid* grid = find(folder.density(frame.number, layer.name));
+            if (grid == nullptr) continue;
+            layers.push_back(*grid);
             boundaries.push_back(layer.boundaries);
         }
-        const auto whole = find(folder.density(frame.number));
+        const DensityGrid* whole = find(folder.density(frame.number));
         const auto expected =
             std::ranges::count_if(run_.scene.layers, [](const auto& layer) { return has_density(layer); });
-        if (whole != grids.end() && !layers.empty() && std::ssize(layers) == expected) {
-            if (is_too_large(whole->second)) {
-                too_large_ = not_compared(whole->second);
+        if (whole != nullptr && !layers.empty() && std::ssize(layers) == expected) {
+            if (const std::string why = why_too_large(*whole); !why.empty()) {
+                too_large_ = why;
             } else {
-                compare_layers(frame, whole->second, layers, boundaries, largest_, sums_);
+                compare_layers(frame, *whole, layers, boundaries, largest_, sums_);
                 ++compared_;
             }
         }
-        last_ = whole != grids.end() ? whole->second : grids.begin()->second;
-        if (!is_too_large(*last_)) motion_.add(*last_);
+        for (DensitySequence& sequence : sequences_)
+            add_frame(sequence, frame.number,
+                      sequence.layer.empty() ? whole : find(folder.density(frame.number, sequence.layer)));
     }
 
-    // A frame cannot be compared with the next one.
-    void skip() { motion_.skip(); }
-
-    void checks(const VerifyOptions& options, std::vector<Check>& checks) const {
+    // Appends the checks, after the last frame.
+    void finish_checks(std::vector<Check>& checks) {
         if (compared_ > 0) {
             checks.push_back(sums_.check(
                 "layers",
@@ -208,63 +177,24 @@ class Frames {
         } else if (!too_large_.empty()) {
             checks.push_back({"layers", true, too_large_});
         }
-        if (!last_) {
-            const std::string none = "there is no density";
-            if (options.seam) checks.push_back({"seam", false, none, {}, false});
-            if (options.max_change) checks.push_back({"motion", false, none, {}, false});
-            return;
-        }
-        checks.push_back(check_seams(run_, *last_, options.seam));
-        if (is_too_large(*last_)) {
-            const bool is_asked = options.max_change.has_value();
-            checks.push_back({"motion", !is_asked, not_compared(*last_), {}, !is_asked});
-        } else {
-            checks.push_back(motion_.check(options.max_change));
-        }
+        for (DensitySequence& sequence : sequences_) finish(sequence);
+        const bool is_read =
+            std::ranges::any_of(sequences_, [](const DensitySequence& s) { return s.files > 0; });
+        if (is_read || options_.seam) checks.push_back(check_seams(sequences_, options_.seam));
+        if (is_read || options_.max_change) checks.push_back(check_motion(sequences_, options_.max_change));
     }
 
   private:
     const RunListing& run_;
-    SequenceMotion motion_;
+    const VerifyOptions& options_;
+    std::vector<DensitySequence> sequences_;
     Problems sums_;
     double largest_ = 0;
     std::size_t compared_ = 0;
     std::string too_large_;  // why frames were not compared
-    std::optional<DensityGrid> last_;
 };
 
 }  // namespace
-
-Seam seam_of(const std::vector<float>& density, int nx, int ny, int nz, int axis) {
-    const int n = axis == 0 ? nx : axis == 1 ? ny : nz;
-    const std::size_t stride = axis == 0   ? 1
-                               : axis == 1 ? std::size_t(nx)
-                                           : std::size_t(nx) * std::size_t(ny);
-    std::vector<double> planes(std::size_t(n), 0.0);
-    for (std::size_t at = 0; at < density.size(); ++at) {
-        const int i = int(at / stride % std::size_t(n));
-        const std::size_t base = at - std::size_t(i) * stride;
-        const auto value = [&](int k) { return double(density[base + std::size_t((k + n) % n) * stride]); };
-        planes[std::size_t(i)] += std::abs(value(i - 1) - 2 * value(i) + value(i + 1));
-    }
-    constexpr double kDeviations = 4;
-    const double count = double(density.size()) / n;
-    Seam seam;
-    double sum = 0, squares = 0;
-    for (int i = 0; i < n; ++i) {
-        const double roughness = planes[std::size_t(i)] / count;
-        const bool at_seam = i == 0 || i == n - 1;
-        double& most = at_seam ? seam.at_seam : seam.inside;
-        most = std::max(most, roughness);
-        if (at_seam) continue;
-        sum += roughness;
-        squares += roughness * roughness;
-    }
-    const double inner = std::max(1, n - 2), mean = sum / inner;
-    seam.limit =
-        std::max(seam.inside, mean + kDeviations * std::sqrt(std::max(0.0, squares / inner - mean * mean)));
-    return seam;
-}
 
 void check_content(const RunListing& run, const VerifyOptions& options, std::vector<Check>& checks) {
     struct Source {
@@ -283,20 +213,14 @@ void check_content(const RunListing& run, const VerifyOptions& options, std::vec
     VdbReadOptions reading;
     reading.list_grids = true;
     Decoder decoder(run);
-    Frames frames(run);
+    Frames frames(run, options);
     Problems unread;
     std::map<std::string, DensityGrid> grids;
     std::size_t next = 0;
-    bool is_whole = true;  // all files of the frame could be read
     const auto finish_file = [&] {
         const ListedFrame* frame = sources[next].frame;
         if (++next < sources.size() && sources[next].frame == frame) return;
-        if (is_whole)
-            frames.add(*frame, std::exchange(grids, {}));
-        else
-            frames.skip();
-        grids.clear();
-        is_whole = true;
+        frames.add(*frame, std::exchange(grids, {}));
     };
     const auto take = [&](LoadedDensity&& loaded) {
         const auto& [frame, file] = sources[next];
@@ -319,7 +243,6 @@ void check_content(const RunListing& run, const VerifyOptions& options, std::vec
                 if (!std::string_view(failure.what()).starts_with(paths[next].string()))
                     throw;  // of all files
                 unread.add(failure.what());
-                is_whole = false;
                 finish_file();
             } catch (const Error& alone) {
                 if (!std::string_view(alone.what()).starts_with(paths[next].string())) throw;  // nor this
@@ -328,8 +251,8 @@ void check_content(const RunListing& run, const VerifyOptions& options, std::vec
             }
         }
     }
-    for (Check& check : decoder.checks()) checks.push_back(std::move(check));
-    frames.checks(options, checks);
+    for (Check& check : decoder.checks(sources.size())) checks.push_back(std::move(check));
+    frames.finish_checks(checks);
     if (!unread.none()) checks.push_back(unread.not_done("decoding"));
 }
 

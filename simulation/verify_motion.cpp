@@ -4,13 +4,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <string>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "simulation/scene_place.h"
+
 namespace nephos {
 namespace {
+
+// Voxels that are compared one by one: as floats they take 1 GiB. Boxes between layers that lie far apart have many, and
+// hardly any with cloud.
+constexpr std::size_t kMostCompared = std::size_t(1) << 28;
 
 // Sums and maxima in so many lanes that the compiler makes vectors of them, as their order is fixed.
 constexpr std::size_t kLanes = 16;
@@ -44,27 +50,210 @@ float largest_change(const std::vector<float>& before, const std::vector<float>&
     return *std::ranges::max_element(lanes);
 }
 
-}  // namespace
-
-void SequenceMotion::add(const DensityGrid& grid) {
-    std::vector<float> now = grid.to_dense();
-    const double gradients = sum_of_gradients(now, std::size_t(grid.extent().x));
-    if (before_.size() == now.size()) {
-        change_ = std::max(change_, double(largest_change(before_, now)));
-        if (sharpness_ > 0)
-            sharpness_change_ = std::max(sharpness_change_, std::abs(gradients / sharpness_ - 1));
-    }
-    sharpness_ = gradients;
-    before_ = std::move(now);
+// Returns how far a seam stands out: above 1 it shows.
+double prominence(const Seam& seam) {
+    if (seam.limit > 0) return seam.at_seam / seam.limit;
+    return seam.at_seam > 0 ? std::numeric_limits<double>::infinity() : 0;
 }
 
-Check SequenceMotion::check(const std::optional<double>& most) const {
-    const bool good = !most || change_ <= *most;
-    std::string text =
-        fmt::format("largest change of a voxel {:.3g}, of the sum of gradients {:.2g} %, from frame to frame",
-                    change_, 100 * sharpness_change_);
-    if (!good) text += fmt::format("; at most {:g} is allowed", *most);
-    return {"motion", good, text, {{"largest_change", change_}, {"sharpness_change", sharpness_change_}}};
+bool shows_more(const Seam& one, const Seam& other) {
+    return std::pair(one.shows(), prominence(one)) > std::pair(other.shows(), prominence(other));
+}
+
+void measure_seams(DensitySequence& sequence, int frame, Extent e, const std::vector<float>& density) {
+    for (int axis = 0; axis < 2; ++axis) {
+        if (!sequence.every_seam && sequence.period_m[axis] == 0) continue;
+        const Seam seam = seam_of(density, e.x, e.y, e.z, axis);
+        std::optional<FrameSeam>& worst = sequence.seams[std::size_t(axis)];
+        if (!worst || shows_more(seam, worst->seam)) worst = {frame, seam};
+    }
+}
+
+std::string of_layer(const DensitySequence& sequence) {
+    return sequence.layer.empty() ? "" : " of layer " + sequence.layer;
+}
+
+// Returns why no seam of a sequence was measured; empty: all were.
+std::string why_no_seam(const DensitySequence& sequence) {
+    if (sequence.frames == 0) return "there is no density";
+    if (sequence.files == 0) return "no density file could be read";
+    return sequence.too_large;
+}
+
+// Returns why no frames of a sequence were compared; empty: some were.
+std::string why_no_motion(const DensitySequence& sequence) {
+    if (std::string why = why_no_seam(sequence); !why.empty()) return why;
+    if (sequence.pairs > 0) return {};
+    return sequence.frames == 1 ? "not compared: there is a single frame"
+                                : "not compared: no two frames that follow each other could be read";
+}
+
+// Returns what `why` says of all sequences.
+template <class Why>
+std::string reasons(std::span<const DensitySequence> sequences, const Why& why) {
+    std::string text;
+    for (const DensitySequence& sequence : sequences) {
+        const std::string reason = why(sequence);
+        if (reason.empty()) continue;
+        text += (text.empty() ? "" : "; ") +
+                (sequence.layer.empty() ? reason : "layer " + sequence.layer + ": " + reason);
+    }
+    return text;
+}
+
+// Returns a check with what it leaves out. Demanded, it passes with nothing left out alone.
+Check with_reasons(Check check, const std::string& why, bool is_demanded) {
+    if (why.empty()) return check;
+    if (is_demanded && check.passed) return {check.name, false, why, {}, false};
+    check.detail += (check.detail.empty() ? "" : "; ") + why;
+    return check;
+}
+
+}  // namespace
+
+std::string why_too_large(const DensityGrid& grid) {
+    const std::size_t voxels = grid.extent().cells();
+    if (voxels <= kMostCompared) return {};
+    return fmt::format("not done: the box has {} voxels, of which at most {} are compared", voxels,
+                       kMostCompared);
+}
+
+std::vector<DensitySequence> sequences_of(const RunListing& run, bool every_seam) {
+    const Scene& scene = run.scene;
+    const auto sequence = [&](const std::string& name, std::optional<std::size_t> layer) {
+        DensitySequence result;
+        result.layer = name;
+        result.period_m = period_m(scene, layer);
+        result.every_seam = every_seam;
+        return result;
+    };
+    if (scene.layers.empty() || scene.density_files.combined || !has_density(scene))
+        return {sequence({}, std::nullopt)};
+    std::vector<DensitySequence> sequences;
+    for (std::size_t n = 0; n < scene.layers.size(); ++n)
+        if (has_density(scene.layers[n])) sequences.push_back(sequence(scene.layers[n].name, n));
+    return sequences;
+}
+
+void add_frame(DensitySequence& sequence, int frame, const DensityGrid* grid) {
+    ++sequence.frames;
+    if (grid == nullptr) return;
+    ++sequence.files;
+    std::optional<DensitySequence::Last>& last = sequence.last;
+    double gradients = 0;
+    if (const std::string why = why_too_large(*grid); !why.empty()) {
+        sequence.too_large = why;
+    } else {
+        const Extent e = grid->extent();
+        const std::vector<float> now = grid->to_dense();
+        if (sequence.every_seam) measure_seams(sequence, frame, e, now);
+        gradients = sum_of_gradients(now, std::size_t(e.x));
+        if (last && last->frame + 1 == frame && last->grid.extent() == e) {
+            ++sequence.pairs;
+            // Kept sparse in between, as there may be many layers.
+            const double change = double(largest_change(last->grid.to_dense(), now));
+            sequence.change = std::max(sequence.change, change);
+            if (last->gradients > 0)
+                sequence.sharpness_change =
+                    std::max(sequence.sharpness_change, std::abs(gradients / last->gradients - 1));
+        }
+    }
+    last = {frame, *grid, gradients};
+}
+
+void finish(DensitySequence& sequence) {
+    const std::optional<DensitySequence::Last>& last = sequence.last;
+    const bool repeats = sequence.period_m.x != 0 || sequence.period_m.y != 0;
+    if (sequence.every_seam || !repeats || !last || !why_too_large(last->grid).empty()) return;
+    measure_seams(sequence, last->frame, last->grid.extent(), last->grid.to_dense());
+}
+
+Check check_seams(std::span<const DensitySequence> sequences, bool is_demanded) {
+    constexpr std::array kNames{"x", "y"};
+    Check check{"seam", true, {}};
+    int files = 0;
+    for (const DensitySequence& sequence : sequences) files += sequence.files;
+    for (std::size_t axis = 0; axis < kNames.size(); ++axis) {
+        const DensitySequence* worst = nullptr;
+        for (const DensitySequence& sequence : sequences)
+            if (sequence.seams[axis] &&
+                (worst == nullptr || shows_more(sequence.seams[axis]->seam, worst->seams[axis]->seam)))
+                worst = &sequence;
+        if (worst == nullptr) continue;
+        const auto& [frame, seam] = *worst->seams[axis];
+        check.passed = check.passed && !(is_demanded && seam.shows());
+        check.detail +=
+            fmt::format("{}{}: {:.3g} at the seam of frame {}{}, at most {:.3g} inside, shows above {:.3g}{}",
+                        check.detail.empty() ? "" : "; ", kNames[axis], seam.at_seam, frame, of_layer(*worst),
+                        seam.inside, seam.limit, seam.shows() ? " (the seam shows)" : "");
+        check.figures.emplace_back(fmt::format("{}_seam", kNames[axis]), seam.at_seam);
+        check.figures.emplace_back(fmt::format("{}_inside", kNames[axis]), seam.inside);
+        check.figures.emplace_back(fmt::format("{}_limit", kNames[axis]), seam.limit);
+    }
+    if (is_demanded && !check.detail.empty())
+        check.detail += fmt::format("; the worst of {} density files", files);
+    check = with_reasons(std::move(check), reasons(sequences, why_no_seam), is_demanded);
+    if (check.detail.empty()) check.detail = "no axis repeats";
+    return check;
+}
+
+Check check_motion(std::span<const DensitySequence> sequences, const std::optional<double>& most) {
+    const DensitySequence* changed = nullptr;
+    const DensitySequence* sharpened = nullptr;
+    for (const DensitySequence& sequence : sequences) {
+        if (sequence.pairs == 0) continue;
+        if (changed == nullptr || sequence.change > changed->change) changed = &sequence;
+        if (sharpened == nullptr || sequence.sharpness_change > sharpened->sharpness_change)
+            sharpened = &sequence;
+    }
+    Check check{"motion", true, {}};
+    if (changed != nullptr) {
+        check.passed = !most || changed->change <= *most;
+        check.detail = fmt::format(
+            "largest change of a voxel{} {:.3g}, of the sum of gradients{} {:.2g} %, from frame to frame",
+            of_layer(*changed), changed->change, of_layer(*sharpened), 100 * sharpened->sharpness_change);
+        if (!check.passed) check.detail += fmt::format("; at most {:g} is allowed", *most);
+        check.figures = {{"largest_change", changed->change},
+                         {"sharpness_change", sharpened->sharpness_change}};
+    }
+    return with_reasons(std::move(check), reasons(sequences, why_no_motion), most.has_value());
+}
+
+Seam seam_of(const std::vector<float>& density, int nx, int ny, int nz, int axis) {
+    const int n = axis == 0 ? nx : axis == 1 ? ny : nz;
+    const std::size_t planes_along = std::size_t(n);
+    const std::size_t stride = axis == 0   ? 1
+                               : axis == 1 ? std::size_t(nx)
+                                           : std::size_t(nx) * std::size_t(ny);
+    std::vector<double> planes(planes_along, 0.0);
+    for (std::size_t slab = 0; slab < density.size(); slab += stride * planes_along) {
+        const auto plane = [&](std::size_t k) { return density.data() + slab + k * stride; };
+        for (std::size_t k = 0; k < planes_along; ++k) {
+            const float* before = plane(k == 0 ? planes_along - 1 : k - 1);
+            const float* at = plane(k);
+            const float* after = plane(k + 1 == planes_along ? 0 : k + 1);
+            double& sum = planes[k];
+            for (std::size_t m = 0; m < stride; ++m)
+                sum += std::abs(double(before[m]) - 2 * double(at[m]) + double(after[m]));
+        }
+    }
+    constexpr double kDeviations = 4;
+    const double count = double(density.size()) / n;
+    Seam seam;
+    double sum = 0, squares = 0;
+    for (int i = 0; i < n; ++i) {
+        const double roughness = planes[std::size_t(i)] / count;
+        const bool at_seam = i == 0 || i == n - 1;
+        double& most = at_seam ? seam.at_seam : seam.inside;
+        most = std::max(most, roughness);
+        if (at_seam) continue;
+        sum += roughness;
+        squares += roughness * roughness;
+    }
+    const double inner = std::max(1, n - 2), mean = sum / inner;
+    seam.limit =
+        std::max(seam.inside, mean + kDeviations * std::sqrt(std::max(0.0, squares / inner - mean * mean)));
+    return seam;
 }
 
 }  // namespace nephos

@@ -35,7 +35,8 @@ std::string report_of(const std::string& argument) {
     const std::string path = argument.substr(1);
     std::string text = read_beginning(path, 4096);
     if (text.size() == 4096) throw Error(ErrorCode::usage, path + ": is too long for a report");
-    return text;
+    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+    return text.starts_with(kByteOrderMark) ? text.substr(kByteOrderMark.size()) : text;
 }
 
 nlohmann::ordered_json explanation_json(const Metar& metar) {
@@ -98,10 +99,10 @@ void explain(const MetarArguments& a, const Taf& taf) {
         output.line(json_text({{"forecast", taf.text},
                                {"length_s", taf.length_s},
                                {"periods", periods},
-                               {"notes", taf.notes}}));
+                               {"notes", taf_notes(taf, a.options)}}));
         return;
     }
-    for (const std::string& note : taf.notes) print_note(note);
+    for (const std::string& note : taf_notes(taf, a.options)) print_note(note);
 }
 
 void require_content(const Metar& report) {
@@ -117,7 +118,7 @@ void check_options(const MetarArguments& a, const std::optional<Taf>& taf, const
     const auto whole = [](std::size_t layers) { return std::vector<double>(layers, 1.0); };
     const std::string text = taf ? taf_scene_text(*taf, a.options, whole(layers_of(*taf).size()))
                                  : metar_scene_text(report, a.options, whole(layers_of(report).size()));
-    read_scene_text(text, "the scene of the report");
+    read_scene_text(text, taf ? "the scene of the forecast" : "the scene of the report");
 }
 
 // Throws Error(usage) when another text stands in the file, as a scene of the user's own or one that was tuned by hand.
@@ -174,6 +175,8 @@ int metar(const MetarArguments& a) {
                               {"name", l.layer.name},
                               {"wanted", l.layer.cover},
                               {"cover", l.cover},
+                              {"least_cover", l.least_cover},
+                              {"most_cover", l.most_cover},
                               {"coverage", l.coverage},
                               {"tries", l.tries}});
         json = {{"report", report.text}, {"scene", a.scene}, {"layers", layers}, {"notes", fitted.notes}};
@@ -237,8 +240,9 @@ void add_metar_command(CLI::App& app, Action& action) {
     command->add_flag("--overwrite", a->overwrite,
                       "Replace another scene in the file, and remove the run in the folder first");
     command
-        ->add_option("--date", a->options.date,
-                     "Month of the report, such as 2024-06, which has only the day: for the sun")
+        ->add_option(
+            "--date", a->options.date,
+            "Month in which the report was issued, such as 2024-06, as it has only the day: for the sun")
         ->type_name("YYYY-MM");
     add_value(*command, "--at", "LAT,LON,M", "Place of the aerodrome, degrees, and its elevation in metres",
               [a](const std::string& text) {
@@ -262,8 +266,8 @@ void add_metar_command(CLI::App& app, Action& action) {
         "fog, rain, snow and thunderstorms become those of the scene; what is left out is listed. The clock "
         "of\n"
         "this machine is never used. A TAF becomes a climate: its periods are states, layers come and go, "
-        "and an\n"
-        "hour is a second of film.\n"
+        "each with\n"
+        "its cover on average over its time, and an hour is a second of film.\n"
         "\n"
         "Examples:\n"
         "  nephos metar \"EGLL 211350Z 24012KT 9999 FEW020 SCT045 BKN200 14/08 Q1017\" --explain\n"

@@ -95,8 +95,9 @@ void add_verify_command(CLI::App& app, Action& action) {
     add_value(*command, "--replay", "N",
               "Simulate the first N frames anew and compare states, and voxels of files that are not refined",
               [a](const std::string& text) { a->options.replay = int(parse_integer(text, 1, kMaxFrames)); });
-    command->add_flag("--seam", a->options.seam,
-                      "Demand that the box continues into itself on both horizontal axes, periodic or not");
+    command->add_flag(
+        "--seam", a->options.seam,
+        "Demand that the box of every frame continues into itself on both horizontal axes, periodic or not");
     add_value(*command, "--max-change", "X", "Largest change of a voxel from frame to frame that passes",
               [a](const std::string& text) { a->options.max_change = parse_real(text, 0, 1); });
     add_threads(*command, a->work);
@@ -109,16 +110,18 @@ void add_verify_command(CLI::App& app, Action& action) {
         "to 1,\n"
         "in refined files with detail to 1 + `detail.thermals`;\n"
         "metadata agree with the manifest; layers add up to the common grid; the tables of one that is not\n"
-        "complete begin with what was saved. Reported: roughness at the seam "
-        "of\n"
-        "periodic axes, largest change of a voxel and of sharpness. Of an export: checksums, and the voxels "
-        "read\n"
-        "back from each file against those of the source, within the error of their type.\n"
+        "complete begin with what was saved. Reported: roughness at the seam of periodic axes in the\n"
+        "last frame, largest change of a voxel and of sharpness; where there is no file of all layers "
+        "together\n"
+        "(`density.combined`), of the layer that is worst. Of an export: checksums, and the voxels read "
+        "back\n"
+        "from each file against those of the source, within the error of their type.\n"
         "\n"
-        "Exit status 0: everything holds; 1: a check failed; 3: a file cannot be read, or all holds but\n"
-        "for a check that was asked for and could not be done: --replay takes the files that the scene\n"
-        "names, and of a branch (run --from) the checkpoint that it began with, as they were; --seam and\n"
-        "--max-change a box of at most 2^28 voxels.\n"
+        "Exit status 0: everything holds; 1: a check failed; 2: usage, also where --against names no folder\n"
+        "of a run; 3: a file cannot be read, or all holds but for a check that was asked for and could not\n"
+        "be done: --replay takes the files that the scene names, and of a branch (run --from) the\n"
+        "checkpoint that it began with, as they were; --seam and --max-change a box of at most 2^28\n"
+        "voxels, and --max-change two frames that follow each other.\n"
         "\n"
         "Examples:\n"
         "  nephos verify out/cumulus\n"

@@ -12,6 +12,7 @@
 namespace nephos {
 
 inline constexpr double kKnot = 1852.0 / 3600;  // metres a second
+inline constexpr double kFoot = 0.3048;         // metres
 
 enum class CloudAmount { few, scattered, broken, overcast, obscured, unknown };  // obscured: VV
 

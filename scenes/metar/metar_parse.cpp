@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
 #include "core/error.h"
-#include "scenes/metar/metar.h"
+#include "scenes/metar/report_words.h"
 
 namespace nephos {
 namespace {
@@ -13,72 +12,50 @@ namespace {
 constexpr double kStatuteMile_m = 1609.344;
 constexpr std::size_t kMostClouds = 8;  // groups of clouds: reports have three, some countries six
 
-bool all_digits(std::string_view text) {
-    return !text.empty() &&
-           std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
-}
 bool all_slashes(std::string_view text) { return !text.empty() && text.find_first_not_of('/') == text.npos; }
-// Of at most nine digits.
-int number(std::string_view text) {
-    int value = 0;
-    std::from_chars(text.data(), text.data() + text.size(), value);
-    return value;
-}
 bool is_count(std::string_view text) { return all_digits(text) && text.size() <= 3; }
 
-// The report word by word. Each of the read_ functions takes the group at hand if it is of its kind.
+// The report word by word, up to `end`. Each of the read_ functions takes the group at hand if it is of its kind.
 class Reader {
   public:
-    Reader(std::string_view text, bool lenient) : lenient_(lenient) {
-        for (std::size_t at = 0; at < text.size();) {
-            at = text.find_first_not_of(" \t\r\n", at);
-            if (at == text.npos) break;
-            std::size_t end = std::min(text.find_first_of(" \t\r\n", at), text.size());
-            std::string_view word = text.substr(at, end - at);
-            if (word.ends_with('=')) word.remove_suffix(1);
-            if (!word.empty()) {
-                if (!metar_.text.empty()) metar_.text += ' ';
-                words_.push_back({std::string(word), metar_.text.size()});
-                metar_.text += word;
-            }
-            at = end;
-        }
+    Reader(const ReportWords& report, std::size_t first, std::size_t end, bool forecast, bool lenient)
+        : report_(report),
+          words_(report.words),
+          at_(first),
+          end_(end),
+          forecast_(forecast),
+          lenient_(lenient) {
+        metar_.text = report.text;
     }
 
     Metar read() {
-        for (; at_ < words_.size(); ++at_) {
-            if (!std::ranges::all_of(word(), [](char c) { return c > ' ' && c <= '~'; }))
-                fail("expected letters, digits and signs that a report has");
-        }
-        at_ = 0;
         if (words_.empty())
             throw Error(
                 ErrorCode::usage,
                 "the report is empty: expected one such as EGLL 211350Z 24012KT 9999 FEW020 14/08 Q1017");
         while (is("METAR") || is("SPECI") || is("COR")) take("kind of report", false);
-        if (done() || words_[at_].text.size() != 4 || !std::all_of(word().begin(), word().end(), [](char c) {
+        if (done() || word().size() != 4 || !std::ranges::all_of(word(), [](char c) {
                 return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
             }))
             fail("expected the four capital letters of an aerodrome, such as EGLL");
         metar_.station = word();
         take("aerodrome");
         read_time();
+        return read_groups();
+    }
+
+    Metar read_groups() {
         while (!done()) {
             if (is("NIL")) fail("the report says that there is none (NIL)");
-            if (is("RMK")) return take_rest("remarks");
-            if (is("NOSIG") || is("BECMG") || is("TEMPO")) return take_rest("trend");
+            if (!forecast_ && is("RMK")) return take_rest("remarks");
+            if (!forecast_ && (is("NOSIG") || is("BECMG") || is("TEMPO"))) return take_rest("trend");
             read_group();
         }
         return finished();
     }
 
   private:
-    struct Word {
-        std::string text;
-        std::size_t column;
-    };
-
-    bool done() const { return at_ >= words_.size(); }
+    bool done() const { return at_ >= end_; }
     const std::string& word() const { return words_[at_].text; }
     bool is(std::string_view text) const { return !done() && word() == text; }
 
@@ -90,22 +67,10 @@ class Reader {
         at_ += words;
     }
 
-    [[noreturn]] void fail(const std::string& expected) const {
-        const std::size_t column = done() ? metar_.text.size() : words_[at_].column;
-        const std::size_t length = done() ? 1 : word().size();
-        constexpr std::size_t kLongestWord = 60, kLongest = 1000;  // far longer than those of reports
-        std::string shown = done() ? "" : word();
-        std::size_t end = kLongestWord;
-        while (end > 0 && end < shown.size() && (shown[end] & 0xC0) == 0x80) --end;  // within a character
-        if (shown.size() > kLongestWord) shown = shown.substr(0, end) + "...";
-        const std::string what = (done() ? "the report ends early" : "`" + shown + "`") + ": " + expected;
-        if (metar_.text.size() > kLongest) throw Error(ErrorCode::usage, what);
-        throw Error(ErrorCode::usage, what + "\n  " + metar_.text + "\n  " + std::string(column, ' ') +
-                                          std::string(length, '^'));
-    }
+    [[noreturn]] void fail(const std::string& expected) const { fail_at(report_, at_, expected); }
 
     Metar take_rest(const char* meaning) {
-        take(meaning, false, words_.size() - at_);
+        take(meaning, false, end_ - at_);
         return finished();
     }
 
@@ -143,12 +108,28 @@ class Reader {
             metar_.automatic = metar_.automatic || is("AUTO");
             return take(is("AUTO") ? "automatic station" : "corrected", false);
         }
+        if (forecast_ && read_of_forecast()) return;
         if (read_wind() || read_visibility() || read_sky() || read_temperature() || read_pressure() ||
             read_other() || read_weather())
             return;
+        if (is_interval(word())) fail("expected groups of a report: the text of a forecast begins with TAF");
         if (!lenient_) fail("expected wind, visibility, weather, clouds, temperature or pressure");
         metar_.warnings.push_back("`" + word() + "` is no group that is known, and was left out");
         take("not understood", false);
+    }
+
+    // Groups that only forecasts have.
+    bool read_of_forecast() {
+        const std::string& w = word();
+        if (w == "NSW") {
+            take("no significant weather");
+            return true;
+        }
+        const bool temperature = (w.starts_with("TX") || w.starts_with("TN")) && w.find('/') != w.npos;
+        const bool shear = w.starts_with("WS") && w.size() > 2;
+        if (!temperature && !shear && !w.starts_with("QNH")) return false;
+        take(temperature ? "temperature" : shear ? "wind shear" : "pressure", false);
+        return true;
     }
 
     // dddff[Gff]UNIT; parts may be slashes, the unit may be missing or a word of its own.
@@ -157,9 +138,7 @@ class Reader {
         std::size_t words = 1;
         if (w.size() == 7 && all_digits(w.substr(0, 3)) && w[3] == 'V' && all_digits(w.substr(4)))
             return read_sector(w);
-        const auto gap = [&](std::size_t n) {
-            return at_ + n < words_.size() ? words_[at_ + n].text : std::string();
-        };
+        const auto gap = [&](std::size_t n) { return at_ + n < end_ ? words_[at_ + n].text : std::string(); };
         const bool head = w.size() == 5 && (all_digits(w) || w.starts_with("VRB"));
         if (head && gap(1).size() >= 5 && gap(1).front() == 'G' &&
             (gap(1).ends_with("KT") || gap(1).ends_with("MPS"))) {
@@ -263,8 +242,7 @@ class Reader {
         std::string miles = w;
         double whole = 0;
         std::size_t words = 1;
-        if (all_digits(w) && w.size() <= 2 && at_ + 1 < words_.size() &&
-            words_[at_ + 1].text.ends_with("SM")) {
+        if (all_digits(w) && w.size() <= 2 && at_ + 1 < end_ && words_[at_ + 1].text.ends_with("SM")) {
             whole = number(w);
             miles = words_[at_ + 1].text;
             words = 2;
@@ -318,7 +296,7 @@ class Reader {
             // "FEW025CB///": slashes behind a type say nothing; "FEW025 CB" has a gap.
             while (!type.empty() && type.back() == '/') type.pop_back();
             std::size_t words = 1;
-            if (type.empty() && w.size() == 6 && at_ + 1 < words_.size() &&
+            if (type.empty() && w.size() == 6 && at_ + 1 < end_ &&
                 (words_[at_ + 1].text == "CB" || words_[at_ + 1].text == "TCU")) {
                 type = words_[at_ + 1].text;
                 words = 2;
@@ -340,7 +318,7 @@ class Reader {
             take(known ? "cloud base at " + std::to_string(*cloud.height_ft) + " ft" +
                              (type.empty() ? "" : ", " + type)
                        : "cloud of unknown amount or height",
-                 cloud.height_ft.has_value(), words);
+                 known, words);
             return true;
         }
         return false;
@@ -404,7 +382,7 @@ class Reader {
         const std::string& w = word();
         if (w == "WS") {
             std::size_t words = 1;
-            while (at_ + words < words_.size() && words < 4 &&
+            while (at_ + words < end_ && words < 4 &&
                    (words_[at_ + words].text == "ALL" || words_[at_ + words].text == "RWY" ||
                     words_[at_ + words].text.starts_with("R")))
                 ++words;
@@ -465,14 +443,22 @@ class Reader {
     }
 
     Metar metar_;
-    std::vector<Word> words_;
-    std::size_t at_ = 0;
-    bool lenient_, seen_wind_ = false, seen_temperature_ = false;
+    const ReportWords& report_;
+    const std::vector<ReportWord>& words_;
+    std::size_t at_, end_;
+    bool forecast_, lenient_, seen_wind_ = false, seen_temperature_ = false;
 };
 
 }  // namespace
 
-Metar parse_metar(std::string_view text, bool lenient) { return Reader(text, lenient).read(); }
+Metar parse_metar(std::string_view text, bool lenient) {
+    const ReportWords report = words_of(text);
+    return Reader(report, 0, report.words.size(), false, lenient).read();
+}
+
+Metar parse_groups(const ReportWords& words, std::size_t first, std::size_t end, bool lenient) {
+    return Reader(words, first, end, true, lenient).read_groups();
+}
 
 bool tells_nothing(const Metar& metar) {
     const auto time = std::ranges::find(metar.groups, "day and time, UTC", &MetarGroup::meaning);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <charconv>
 #include <chrono>
+#include <optional>
 
 #include "core/error.h"
+#include "scenes/metar/report_words.h"
+#include "scenes/metar/scene_parts.h"
 #include "scenes/metar/taf.h"
 
 namespace nephos {
@@ -12,133 +14,187 @@ namespace {
 constexpr double kHour = 3600;
 constexpr double kRapid_s = 1200;  // of a change that FM gives a minute for
 
-bool all_digits(std::string_view text) {
-    return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
-}
-int number(std::string_view text) {
-    int value = 0;
-    std::from_chars(text.data(), text.data() + text.size(), value);
-    return value;
-}
-
-std::vector<std::string> words_of(std::string_view text) {
-    std::vector<std::string> words;
-    for (std::size_t at = text.find_first_not_of(" \t\r\n"); at != text.npos;) {
-        const std::size_t end = std::min(text.find_first_of(" \t\r\n", at), text.size());
-        std::string word(text.substr(at, end - at));
-        if (word.ends_with('=')) word.pop_back();
-        if (!word.empty()) words.push_back(std::move(word));
-        at = text.find_first_not_of(" \t\r\n", end);
-    }
-    return words;
-}
-
-std::string joined(const std::vector<std::string>& words, std::size_t first, std::size_t end) {
-    std::string text;
-    for (std::size_t n = first; n < end; ++n) text += (text.empty() ? "" : " ") + words[n];
-    return text;
-}
-
-// "2112/2218"
-bool is_interval(const std::string& word) {
-    return word.size() == 9 && word[4] == '/' && all_digits(word.substr(0, 4)) && all_digits(word.substr(5));
-}
-bool is_from(const std::string& word) {
+bool is_from(std::string_view word) {
     return word.size() == 8 && word.starts_with("FM") && all_digits(word.substr(2));
 }
-bool begins_change(const std::string& word) {
-    return word == "BECMG" || word == "TEMPO" || word == "INTER" || word.starts_with("PROB") || is_from(word);
+// Also of words that are meant to begin one, so that a mistake does not become a group of the change before it.
+bool begins_change(std::string_view word) {
+    const bool from = word.starts_with("FM") && (word.size() == 2 || all_digits(word.substr(2, 1)));
+    return from || word.starts_with("BECMG") || word.starts_with("TEMPO") || word.starts_with("INTER") ||
+           word.starts_with("PROB");
+}
+bool begins_remarks(std::string_view word) { return word == "RMK" || word == "AMD"; }
+
+// The month of --date, and its day where it names one.
+struct Date {
+    std::chrono::year_month month{};
+    int day = 0;  // 0: not told
+};
+
+// Throws Error(usage) on a text that is no month or day.
+std::optional<Date> date_of(std::string_view text) {
+    using namespace std::chrono;
+    if (text.empty()) return {};
+    const bool has_month =
+        text.size() >= 7 && text[4] == '-' && all_digits(text.substr(0, 4)) && all_digits(text.substr(5, 2));
+    const bool has_day = text.size() == 10 && text[7] == '-' && all_digits(text.substr(8));
+    Date date;
+    if (has_month) date.month = year(number(text.substr(0, 4))) / month(unsigned(number(text.substr(5, 2))));
+    if (has_day) date.day = number(text.substr(8));
+    const bool good = has_month && date.month.ok() && (text.size() == 7 || has_day);
+    if (!good || (has_day && !(date.month / day(unsigned(date.day))).ok()))
+        throw Error(ErrorCode::usage,
+                    "--date '" + std::string(text) + "' is no month: expected one such as 2024-06");
+    return date;
 }
 
-// Returns the number of days of the month in "2024-06" or longer; 0 when it is empty. Throws Error(usage) when it is no
-// month.
-int days_of_month(std::string_view date) {
-    using namespace std::chrono;
-    if (date.empty()) return 0;
-    const bool has_form =
-        date.size() >= 7 && date[4] == '-' && all_digits(date.substr(0, 4)) && all_digits(date.substr(5, 2));
-    const year_month_day_last last =
-        has_form
-            ? year(number(date.substr(0, 4))) / month(unsigned(number(date.substr(5, 2)))) / std::chrono::last
-            : year_month_day_last(year(0), month_day_last(month(0)));
-    if (!last.ok())
-        throw Error(ErrorCode::usage,
-                    "--date '" + std::string(date) + "' is no month: expected one such as 2024-06");
-    return int(unsigned(last.day()));
+bool names_clouds(const Metar& m) {
+    return !m.clouds.empty() || m.cavok || std::ranges::any_of(m.groups, [](const MetarGroup& group) {
+        return group.text == "NSC" || group.text == "SKC" || group.text == "CLR" || group.text == "NCD";
+    });
+}
+bool names_no_weather(const Metar& m) {
+    return std::ranges::any_of(m.groups, [](const MetarGroup& group) { return group.text == "NSW"; });
+}
+// Wind, visibility, weather or clouds.
+bool names_nothing(const Metar& m) {
+    return !m.wind.known && !m.visibility_m && m.weather.empty() && !names_clouds(m) && !names_no_weather(m);
+}
+
+// The weather after a change that names part of it.
+Metar changed(Metar weather, const Metar& change) {
+    if (change.wind.known) weather.wind = change.wind;
+    if (change.visibility_m) weather.visibility_m = change.visibility_m;
+    if (!change.weather.empty() || names_no_weather(change) || change.cavok) weather.weather = change.weather;
+    if (names_clouds(change)) weather.clouds = change.clouds;
+    weather.cavok = change.cavok;
+    return weather;
 }
 
 class TafReader {
   public:
     TafReader(std::string_view text, bool lenient, std::string_view date)
-        : words_(words_of(text)), lenient_(lenient), days_of_month_(days_of_month(date)) {
-        taf_.text = joined(words_, 0, words_.size());
+        : report_(words_of(text)),
+          words_(report_.words),
+          date_text_(date),
+          date_(date_of(date)),
+          lenient_(lenient) {
+        taf_.text = report_.text;
     }
 
     Taf read() {
         read_head();
-        std::size_t end = next_change();
-        taf_.periods.push_back({"", 0, 0, weather_of("the forecast's beginning", end)});
+        const std::size_t end = next_change();
+        Metar weather = weather_of(end);
+        if (names_nothing(weather)) fail("expected wind, visibility, weather or clouds of the beginning");
+        if (!weather.wind.known) note("the forecast's beginning names no wind: the air is calm");
+        taf_.periods.push_back({"", 0, 0, std::move(weather)});
         at_ = end;
         while (at_ < words_.size()) read_change();
+        if (const std::size_t layers = layers_of(taf_).size() + kinds_of_rain(taf_); layers > kMostTafLayers)
+            throw Error(ErrorCode::usage,
+                        "the forecast has " + std::to_string(layers) +
+                            " different groups of clouds and of what falls: expected at most " +
+                            std::to_string(kMostTafLayers) + ", as a scene has layers");
         return std::move(taf_);
     }
 
   private:
-    [[noreturn]] void fail(const std::string& expected) const {
-        const std::string word = at_ < words_.size() ? "`" + words_[at_] + "`" : "the forecast ends early";
-        std::string text = joined(words_, 0, std::min(at_, words_.size()));
-        const std::size_t column = text.size() + (text.empty() ? 0 : 1);
-        const std::size_t length = at_ < words_.size() ? words_[at_].size() : 1;
-        throw Error(ErrorCode::usage, word + ": " + expected + "\n  " + taf_.text + "\n  " +
-                                          std::string(column, ' ') + std::string(length, '^'));
+    [[noreturn]] void fail(const std::string& expected) const { fail_at(report_, at_, expected); }
+    [[noreturn]] void fail_at_word(std::size_t at, const std::string& expected) const {
+        fail_at(report_, at, expected);
+    }
+    bool done() const { return at_ >= words_.size(); }
+    const std::string& word() const { return words_[at_].text; }
+    bool is(std::string_view text) const { return !done() && word() == text; }
+    void note(const std::string& text) {
+        if (std::ranges::find(taf_.notes, text) == taf_.notes.end()) taf_.notes.push_back(text);
     }
 
+    // Throws on a second forecast in between.
     std::size_t next_change() const {
         std::size_t n = at_;
-        while (n < words_.size() && !begins_change(words_[n]) && words_[n] != "RMK") ++n;
+        for (; n < words_.size() && !begins_change(words_[n].text) && !begins_remarks(words_[n].text); ++n)
+            if (words_[n].text == "TAF") fail_at_word(n, "expected one forecast, but another begins here");
         return n;
     }
 
     // The word stands behind the time of validity, or in its place.
     void refuse_cancelled() const {
-        if (at_ < words_.size() && words_[at_] == "CNL") fail("the forecast was cancelled");
+        if (is("CNL")) fail("the forecast was cancelled");
     }
 
     void read_head() {
-        while (at_ < words_.size() && (words_[at_] == "TAF" || words_[at_] == "AMD" || words_[at_] == "COR"))
-            ++at_;
-        if (at_ >= words_.size() || words_[at_].size() != 4)
+        while (is("TAF") || is("AMD") || is("COR")) ++at_;
+        if (done() || word().size() != 4)
             fail("expected the four capital letters of an aerodrome, such as EGLL");
-        taf_.station = words_[at_++];
+        taf_.station = words_[at_++].text;
         // The moment of issue may be missing.
-        if (at_ < words_.size() && words_[at_].size() == 7 && words_[at_].back() == 'Z') ++at_;
-        if (at_ < words_.size() && words_[at_] == "NIL") fail("the forecast says that there is none");
+        int issue_day = 0;
+        if (!done() && word().size() == 7 && word().back() == 'Z') {
+            if (!all_digits(word().substr(0, 6)) || number(word().substr(0, 2)) < 1 ||
+                number(word().substr(0, 2)) > 31)
+                fail("expected day and time of issue (UTC), such as 211100Z");
+            issue_day = number(words_[at_++].text.substr(0, 2));
+        }
+        if (is("NIL")) fail("the forecast says that there is none");
         refuse_cancelled();
-        if (at_ >= words_.size() || !is_interval(words_[at_]))
+        if (done() || !is_interval(word()))
             fail(
                 "expected the time of validity, such as 2112/2218: from the 21st, 12 UTC, to the 22nd, 18 "
                 "UTC");
-        const std::string& valid = words_[at_];
+        const std::string valid = word();
         taf_.day = number(valid.substr(0, 2));
         taf_.hour = number(valid.substr(2, 2));
-        // The last day of the month that the forecast names.
-        for (const std::string& word : words_) {
-            if (is_interval(word))
-                last_day_ = std::max({last_day_, number(word.substr(0, 2)), number(word.substr(5, 2))});
-            if (is_from(word)) last_day_ = std::max(last_day_, number(word.substr(2, 2)));
-        }
-        const bool goes_on = number(valid.substr(5, 2)) < taf_.day;
-        if (days_of_month_ > 0)
-            last_day_ = std::max(days_of_month_, taf_.day);
-        else if (goes_on && last_day_ < 31)
-            taf_.notes.push_back("the month is taken to end on day " + std::to_string(last_day_) +
-                                 ", the last that the forecast names: --date says which month it is");
+        set_month(issue_day);
+        if (!is_moment(valid.substr(0, 4)) || taf_.hour > 23 || !is_moment(valid.substr(5)))
+            fail("expected a validity from day 01 to " + last_of_month_text() +
+                 ", hour 00 to 23, to hour 00 to 24");
+        set_last_day(valid);
         taf_.length_s = moment(valid.substr(5), 0);
-        if (!is_moment(valid.substr(0, 4)) || taf_.hour > 23 || !is_moment(valid.substr(5)) || taf_.length_s <= 0 ||
-            taf_.length_s > 48 * kHour)
-            fail("expected a validity of at most 48 hours, from day 01 to 31, hour 00 to 23, to hour 00 to 24");
+        if (taf_.length_s <= 0 || taf_.length_s > 48 * kHour)
+            fail("expected a validity of at most 48 hours, and some");
         ++at_;
         refuse_cancelled();
+    }
+
+    // Finds the month of the day on which the forecast becomes valid: that of --date, or the one after it when it was issued before the month's
+    // end.
+    void set_month(int issue_day) {
+        using namespace std::chrono;
+        if (!date_) return;
+        year_month valid = date_->month;
+        const bool next = issue_day > taf_.day;
+        if (date_->day != 0 && date_->day != issue_day && date_->day != taf_.day)
+            throw Error(
+                ErrorCode::usage,
+                "--date '" + date_text_ + "' does not fit the forecast's day " + std::to_string(taf_.day) +
+                    ": expected a month such as 2024-06, or that day of one, of the years 1900 to 2100");
+        if (next && date_->day != taf_.day) valid += months(1);
+        days_of_month_ = int(unsigned((valid / last).day()));
+        const auto digits = [](int value, std::size_t width) {
+            const std::string text = std::to_string(value);
+            return std::string(width - std::min(width, text.size()), '0') + text;
+        };
+        taf_.date = digits(int(valid.year()), 4) + "-" + digits(int(unsigned(valid.month())), 2) + "-" +
+                    digits(taf_.day, 2);
+    }
+
+    // The last day of the month in which the forecast becomes valid, or the last that it names.
+    void set_last_day(const std::string& valid) {
+        last_day_ = days_of_month_;
+        if (last_day_ > 0) return;
+        for (const ReportWord& w : words_) {
+            if (begins_remarks(w.text) && &w != &words_.front() && &w > &words_[at_]) break;
+            const auto take = [&](std::string_view day) {
+                if (number(day) <= 31) last_day_ = std::max(last_day_, number(day));
+            };
+            if (is_interval(w.text)) take(w.text.substr(0, 2)), take(w.text.substr(5, 2));
+            if (is_from(w.text)) take(w.text.substr(2, 2));
+        }
+        if (number(valid.substr(5, 2)) < taf_.day && last_day_ < 31)
+            note("the month is taken to end on day " + std::to_string(last_day_) +
+                 ", the last that the forecast names: --date says which month it is");
     }
 
     // Returns whether it is a day of the month and an hour, "2118".
@@ -147,6 +203,10 @@ class TafReader {
         return day >= 1 && day <= last_of_month() && hour <= 24;
     }
     int last_of_month() const { return days_of_month_ > 0 ? days_of_month_ : 31; }
+    std::string last_of_month_text() const {
+        return std::to_string(last_of_month()) +
+               (days_of_month_ > 0 ? ", the last of the month of --date" : "");
+    }
 
     // Seconds after the beginning of validity of a day and an hour, "2118".
     double moment(const std::string& text, int minute) const {
@@ -155,133 +215,151 @@ class TafReader {
         return (24.0 * days + hour - taf_.hour) * kHour + 60.0 * minute;
     }
 
-    // The groups from here to `end` as a report; those that only forecasts have are noted.
-    Metar weather_of(const std::string& where, std::size_t end) {
-        std::string report = taf_.station + " 010000Z";
-        no_weather_ = false;
-        for (std::size_t n = at_; n < end; ++n) {
-            const std::string& word = words_[n];
-            const bool temperature =
-                (word.starts_with("TX") || word.starts_with("TN")) && word.find('/') != word.npos;
-            if (word == "NSW") {
-                no_weather_ = true;
-            } else if (temperature || word.starts_with("WS") || word.starts_with("QNH")) {
-                taf_.notes.push_back("`" + word + "` is not in the scene");
-            } else {
-                report += " " + word;
-            }
-        }
-        try {
-            Metar metar = parse_metar(report, lenient_);
-            for (const std::string& warning : metar.warnings) taf_.notes.push_back(where + ": " + warning);
-            return metar;
-        } catch (const Error& error) {
-            throw Error(error.code(), "in " + where + ": " + error.what());
-        }
+    // The groups from here to `end`; those that are left out are noted.
+    Metar weather_of(std::size_t end) {
+        Metar metar = parse_groups(report_, at_, end, lenient_);
+        for (const std::string& text : left_out(metar)) note(text);
+        return metar;
     }
 
     void read_change() {
-        const std::string word = words_[at_];
-        if (word == "RMK") {
-            taf_.notes.push_back("`" + joined(words_, at_, words_.size()) +
-                                 "` (remarks) is not in the scene");
+        if (is("TAF")) fail("expected one forecast, but another begins here");
+        if (begins_remarks(word())) {
+            note("`" + joined(report_, at_, words_.size()) + "` (remarks) is not in the scene");
             at_ = words_.size();
-            return;
-        }
-        const std::size_t first = at_++;
-        if (word != "BECMG" && !is_from(word)) {
-            // PROB30 TEMPO 2118/2121 ...: what may be for a while.
-            while (at_ < words_.size() && (words_[at_] == "TEMPO" || words_[at_] == "INTER")) ++at_;
-            const std::size_t end = next_change();
-            taf_.notes.push_back("`" + joined(words_, first, end) +
-                                 "` is not in the scene: it lasts a while, or is not certain");
-            at_ = end;
-            return;
-        }
-        TafPeriod period;
-        TafPeriod& before = taf_.periods.back();
-        if (is_from(word)) {
-            const int minute = number(word.substr(6, 2));
-            at_ = first;
-            if (!is_moment(word.substr(2, 4)) || minute > 59)
-                fail("expected day, hour and minute of the change, such as FM211530");
-            ++at_;
-            const double moment_s = moment(word.substr(2, 4), minute);
-            if (before.change.starts_with("BECMG") && moment_s > before.from_s && moment_s < before.until_s) {
-                taf_.notes.push_back("`" + before.change + "` ends where `" + word + "` begins");
-                before.until_s = moment_s;
-            }
-            // It may begin where the change before it has just ended.
-            period.from_s = moment_s < before.until_s ? moment_s : std::max(moment_s - kRapid_s / 2, before.until_s);
-            period.until_s = moment_s + kRapid_s / 2;
+        } else if (word().starts_with("FM")) {
+            read_from();
+        } else if (word().starts_with("BECMG")) {
+            read_becoming();
         } else {
-            if (at_ >= words_.size() || !is_interval(words_[at_]))
-                fail("expected the time of the change, such as 2115/2118");
-            const std::string begin = words_[at_].substr(0, 4), end = words_[at_].substr(5);
-            if (!is_moment(begin) || !is_moment(end))
-                fail("expected days from 01 to " + std::to_string(last_of_month()) +
-                     " and hours from 00 to 24");
-            period.from_s = moment(begin, 0);
-            period.until_s = moment(end, 0);
-            ++at_;
-            if (period.until_s > period.from_s && read_overlap(first, period)) return;
+            leave_out_change();
         }
-        period.change = joined(words_, first, at_);
-        if (period.until_s <= period.from_s || period.from_s < before.until_s ||
-            period.from_s > taf_.length_s) {
-            at_ = first;
+    }
+
+    // PROB30 TEMPO 2118/2121 ...: what may be for a while. It is read, as a mistake in it may hide a change.
+    void leave_out_change() {
+        const std::size_t first = at_;
+        const auto lasts = [&] { return is("TEMPO") || is("INTER"); };
+        const bool likely = word().size() == 6 && word().starts_with("PROB") && all_digits(word().substr(4));
+        if (!likely && !lasts()) fail("expected TEMPO, INTER, or PROB with a percentage, such as PROB30");
+        ++at_;
+        if (likely && lasts()) ++at_;
+        read_interval();
+        const std::size_t end = next_change();
+        const Metar weather = parse_groups(report_, at_, end, lenient_);
+        for (const std::string& warning : weather.warnings) note(warning);
+        note("`" + joined(report_, first, end) +
+             "` is not in the scene: it lasts a while, or is not certain");
+        at_ = end;
+    }
+
+    // Takes the time of a change, "2115/2118".
+    std::pair<double, double> read_interval() {
+        if (done() || !is_interval(word())) fail("expected the time of the change, such as 2115/2118");
+        const std::string begin = word().substr(0, 4), end = word().substr(5);
+        if (!is_moment(begin) || !is_moment(end))
+            fail("expected days from 01 to " + last_of_month_text() + ", and hours from 00 to 24");
+        const std::pair<double, double> times{moment(begin, 0), moment(end, 0)};
+        if (!(times.second > times.first)) fail("expected a change that ends after it has begun");
+        ++at_;
+        return times;
+    }
+
+    // Changes come by the time at which they begin.
+    void require_order(std::size_t at, double begin_s) {
+        if (begin_s < last_begin_s_ || begin_s >= taf_.length_s)
+            fail_at_word(at, "expected changes in the order of time, within the validity");
+        last_begin_s_ = begin_s;
+    }
+
+    // FM211530 ...: all of the weather is another one from then on, whatever change was under way.
+    void read_from() {
+        const std::size_t first = at_;
+        const std::string moment_text = word();
+        if (!is_from(moment_text) || !is_moment(moment_text.substr(2, 4)) ||
+            number(moment_text.substr(6)) > 59)
+            fail("expected day, hour and minute of the change, such as FM211530, with days up to " +
+                 last_of_month_text());
+        const double moment_s = moment(moment_text.substr(2, 4), number(moment_text.substr(6)));
+        const bool twice = taf_.periods.back().change.starts_with("FM") && moment_s <= last_begin_s_;
+        if (twice || (taf_.periods.size() > 1 && moment_s < 0))
             fail("expected changes in the order of time, within the validity");
-        }
+        require_order(first, moment_s);
+        ++at_;
         const std::size_t end = next_change();
-        const Metar change = weather_of(period.change, end);
-        period.weather = is_from(word) ? change : changed(before.weather, change);
-        at_ = end;
-        taf_.periods.push_back(std::move(period));
-    }
-
-    // Changes of parts of the weather may overlap: one within the time of that before it joins it, and one that lasts
-    // longer begins at its end.
-    bool read_overlap(std::size_t first, TafPeriod& period) {
+        Metar weather = weather_of(end);
+        if (names_nothing(weather)) fail("expected wind, visibility, weather or clouds from then on");
+        while (taf_.periods.size() > 1 && taf_.periods.back().from_s >= moment_s) {
+            note("`" + taf_.periods.back().change + "` is not in the scene: `" + moment_text +
+                 "` comes before it");
+            taf_.periods.pop_back();
+        }
         TafPeriod& before = taf_.periods.back();
-        if (taf_.periods.size() == 1 || period.from_s < before.from_s || period.from_s >= before.until_s) return false;
-        const std::string text = joined(words_, first, at_);
-        if (period.until_s > before.until_s) {
-            taf_.notes.push_back("`" + text + "` begins at the end of `" + before.change + "`, which it overlaps");
-            period.from_s = before.until_s;
-            return false;
+        if (before.until_s > moment_s) {
+            if (before.change.starts_with("BECMG"))
+                note("`" + before.change + "` ends where `" + moment_text + "` begins");
+            before.until_s = moment_s;
         }
-        const std::size_t end = next_change();
-        before.weather = changed(before.weather, weather_of(text, end));
-        before.change += ", " + text;
+        if (!weather.wind.known) {
+            note("`" + moment_text + "` names no wind: that before it goes on");
+            weather.wind = before.weather.wind;
+        }
+        if (!names_clouds(weather))
+            note("`" + moment_text + "` names no clouds: there are none from then on");
+        taf_.periods.push_back({moment_text, std::max(moment_s - kRapid_s / 2, before.until_s),
+                                moment_s + kRapid_s / 2, std::move(weather)});
         at_ = end;
-        return true;
     }
 
-    // The weather after a change that names part of it.
-    Metar changed(Metar weather, const Metar& change) const {
-        const bool clear = change.cavok || std::ranges::any_of(change.groups, [](const MetarGroup& group) {
-                               return group.text == "NSC" || group.text == "SKC" || group.text == "CLR";
-                           });
-        if (change.wind.known) weather.wind = change.wind;
-        if (change.visibility_m) weather.visibility_m = change.visibility_m;
-        if (!change.weather.empty() || no_weather_ || change.cavok) weather.weather = change.weather;
-        if (!change.clouds.empty() || clear) weather.clouds = change.clouds;
-        weather.cavok = change.cavok;
-        return weather;
+    // BECMG 2115/2118 ...: part of the weather changes, some time in between. One within the time of that before it joins it, and
+    // one that lasts longer begins at its end.
+    void read_becoming() {
+        const std::size_t first = at_;
+        if (!is("BECMG")) fail("expected BECMG and the time of the change, such as BECMG 2115/2118");
+        ++at_;
+        auto [from_s, until_s] = read_interval();
+        require_order(first, from_s);
+        const std::string text = joined(report_, first, at_);
+        const std::size_t end = next_change();
+        const Metar change = weather_of(end);
+        if (names_nothing(change)) fail("expected the wind, visibility, weather or clouds that it becomes");
+        at_ = end;
+        if (until_s > taf_.length_s) note("`" + text + "` goes on after the end of the forecast's validity");
+        TafPeriod& before = taf_.periods.back();
+        const Metar weather = changed(before.weather, change);
+        if (from_s < before.until_s) {
+            const bool gradual = before.change.starts_with("BECMG");
+            if (until_s <= before.until_s) {
+                note("`" + text + "` is a part of `" + before.change + "`, within which it lies");
+                before.weather = weather;
+                before.change += ", " + text;
+                return;
+            }
+            if (gradual)
+                note("`" + text + "` begins at the end of `" + before.change + "`, which it overlaps");
+            from_s = before.until_s;
+        }
+        taf_.periods.push_back({text, from_s, until_s, weather});
     }
 
     Taf taf_;
-    std::vector<std::string> words_;
-    bool lenient_ = false, no_weather_ = false;
+    const ReportWords report_;
+    const std::vector<ReportWord>& words_;
+    std::string date_text_;
+    std::optional<Date> date_;
+    bool lenient_ = false;
     std::size_t at_ = 0;
+    double last_begin_s_ = 0;               // of the change before, as told
     int last_day_ = 0, days_of_month_ = 0;  // the latter 0: not known
 };
 
 }  // namespace
 
 bool is_taf(std::string_view text) {
-    const std::vector<std::string> words = words_of(text);
-    return !words.empty() && words.front() == "TAF";
+    const std::size_t begin = std::min(text.find_first_not_of(" \t\r\n"), text.size());
+    const std::string_view rest = text.substr(begin);
+    return rest.starts_with("TAF") &&
+           (rest.size() == 3 || std::string_view(" \t\r\n=").find(rest[3]) != rest.npos);
 }
 
 Taf parse_taf(std::string_view text, bool lenient, std::string_view date) {

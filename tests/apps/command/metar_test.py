@@ -109,9 +109,15 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
         for nothing in ("EGLL 211350Z", "METAR KXYZ 211350Z AUTO RMK AO2"):
             self.assertIn("tells nothing but place and time", self.call("metar", nothing, status=2).stderr)
         self.assertIn("empty", self.call("metar", "", status=2).stderr)
+        for two in ("EGLL 211350Z 24012KT 9999= EGKK 211350Z 24012KT 9999=", "METAR EGLL 211350Z 24012KT 9999 NOSIG=\nMETAR EGKK 211350Z 24012KT 9999"):
+            for lenient in ((), ("--lenient",)):
+                self.assertIn("expected one report, which ends with `=`", self.call("metar", two, *lenient, status=2).stderr)
+        self.assertIn("the text of a forecast begins with TAF", self.call("metar", "EGLL 211100Z 2112/2218 24012KT 9999", "--lenient", status=2).stderr)
         # Of a file: its name, and all that is wrong, whatever byte is in it.
         (self.folder / "report.txt").write_bytes(b"METAR EGLL 211350Z 24012KT 9999 SC\0T045")
         self.assertIn("report.txt: `SC\\u0000T045`: expected ", self.call("metar", "@report.txt", status=2).stderr)
+        (self.folder / "report.txt").write_bytes(b"\xef\xbb\xbfMETAR EGLL 211350Z 24012KT 9999\r\n")  # a byte order mark is none of it
+        self.call("metar", "@report.txt", "--explain")
         (self.folder / "report.txt").write_bytes(b"METAR EGLL 211350Z 24012KT " + b"X" * 3900)
         said = self.call("metar", "@report.txt", status=2).stderr
         self.assertIn("report.txt: `" + "X" * 60 + "...`: expected", said)
@@ -148,46 +154,6 @@ veil = {{ form = "stratus", octaves = 1, wavelength_m = 4000, base_m = {}, top_m
             self.assertIn(int(direction), range(360))
         for place in ("0,-190,0", "0,190,0", "-95,0,0"):
             self.assertIn("beyond", self.call("metar", REAL[0], "--at", place, status=2).stderr)
-
-    def test_changes_of_forecasts_that_meet(self):
-        """One begins where another ends, overlaps it or lies within it; moments that no day has are refused."""
-        def periods(changes):
-            explained = self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, "--explain", "--json")
-            self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, "-o", "taf.toml", "--overwrite", "-q")
-            self.call("validate", "taf.toml")
-            return json.loads(explained.stdout)
-        found = periods("BECMG 2113/2115 BKN030 FM211500 30015KT 9999 SCT045")
-        self.assertEqual([(p["from_s"], p["until_s"]) for p in found["periods"]], [(0, 0), (3600, 10800), (10800, 11400)])
-        found = periods("BECMG 2113/2116 BKN030 FM211500 30015KT 9999 SCT045")  # ends it
-        self.assertEqual([(p["from_s"], p["until_s"]) for p in found["periods"]], [(0, 0), (3600, 10800), (10800, 11400)])
-        self.assertIn("`BECMG 2113/2116` ends where `FM211500` begins", " ".join(found["notes"]))
-        found = periods("BECMG 2113/2116 BKN030 BECMG 2115/2118 30015KT")
-        self.assertEqual([(p["from_s"], p["until_s"]) for p in found["periods"]], [(0, 0), (3600, 14400), (14400, 21600)])
-        self.assertIn("which it overlaps", " ".join(found["notes"]))
-        found = periods("BECMG 2113/2116 BKN030 BECMG 2113/2116 30015KT")
-        self.assertEqual(len(found["periods"]), 2)
-        self.assertIn("30015KT", found["periods"][1]["weather"])
-        self.assertIn("BKN030", found["periods"][1]["weather"])
-        for changes in ("BECMG 2113/2199 BKN030", "BECMG 0013/0016 BKN030", "FM211270 BKN030", "FM219900 BKN030", "BECMG 2115/2113 BKN030",
-                        "BECMG 2115/2118 BKN030 BECMG 2117/2116 OVC010"):
-            self.assertIn("expected", self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, status=2).stderr)
-        self.assertIn("expected a validity", self.call("metar", "TAF EGLL 2124/2218 24012KT 9999 FEW020", status=2).stderr)
-
-    def test_forecasts_go_on_into_the_next_month(self):
-        def told(*arguments):
-            return json.loads(self.call("metar", "TAF EGLL 301700Z 3018/0100 24012KT 9999 FEW020", "--explain", "--json", *arguments).stdout)
-        for date, hours in (("2024-06", 6), ("2024-07", 30), ("2024-07-30", 30)):
-            found = told("--date", date)
-            self.assertEqual(found["length_s"], 3600 * hours)
-            self.assertFalse([note for note in found["notes"] if "month" in note])
-        for date in ("2024-13", "2024-6", "june", "2024"):
-            self.refused(2, "metar", "TAF EGLL 3018/0100 24012KT 9999 FEW020", "--explain", "--date", date,
-                         says=f"--date '{date}' is no month")
-        self.assertIn("from 01 to 30", self.call("metar", "TAF EGLL 3018/0100 24012KT 9999 FEW020 BECMG 3106/3108 BKN030",
-                                                 "--date", "2024-06", status=2).stderr)
-        found = told()
-        self.assertEqual(found["length_s"], 3600 * 6)
-        self.assertIn("the month is taken to end on day 30", " ".join(found["notes"]))
 
     def test_names_that_no_scene_may_have_are_refused(self):
         for name in ('My "sky"', "a\\b", "a\nb"):

@@ -49,6 +49,32 @@ top_m = 1150
 margin_m = 0
 """
 
+# Two layers of automata in one box: clouds grow in that of the second name, and nothing in the other.
+PAIR = """\
+seed = 3
+[lattice]
+cells = [32, 24, 12]
+[time]
+steps = 6
+[frames]
+per_second = 1
+time_scale = 15
+[[sky]]
+name = "clear"
+state = 0
+clouds = 0
+[[layer]]
+name = "EMPTY"
+skies = "clear"
+base_height_m = 0
+background = { hum = 0.0, act = 0.0, ext = 0.05 }
+[[layer]]
+name = "CLOUDY"
+skies = "clear"
+base_height_m = 0
+background = { hum = 0.15, act = 0.01, ext = 0.05 }
+"""
+
 
 class Verify(Case):
     def checks(self, *arguments, status=0):
@@ -95,6 +121,7 @@ class Verify(Case):
                                    NEPHOS, "verify", folder, "-j1"], cwd=self.folder, env=self.environment, capture_output=True, text=True)
             self.assertEqual(said.returncode, 3, said.stdout + said.stderr)
             self.assertIn("cannot be confined", said.stdout + said.stderr)
+            self.assertNotIn("0 density files", said.stdout)
 
     def test_what_was_not_read_does_not_agree(self):
         """Bytes that nobody compared are no part of those that agree."""
@@ -244,6 +271,78 @@ class Verify(Case):
         self.assertIn("(the seam shows)", self.checks("out")["seam"]["detail"])
         self.assertEqual(self.failed("out", "--seam"), ["seam"])
 
+    def test_the_seam_of_every_frame(self):
+        """One that shows in a frame before the last is a failure, and told with its frame."""
+        self.call("run", self.scene, "--no-render", "--out", "out", "--frames", "1..4", "--set", "time.steps=12",
+                  "--set", "field.background.ext=0.9", "--set", "field.background.hum=0.02")
+        self.assertEqual(self.failed("out", "--seam"), ["seam"])
+        self.assertRegex(self.checks("out", "--seam", status=1)["seam"]["detail"],
+                         r"^x: [\d.]+ at the seam of frame 3, .* \(the seam shows\); y: .*; the worst of 4 density files$")
+        self.call("run", self.scene, "--no-render", "--out", "periodic", "--set", 'lattice.boundaries=["periodic", "periodic", "open"]')
+        self.assertRegex(self.checks("periodic")["seam"]["detail"], r"^x: [\d.]+ at the seam of frame 5, .*; y: [\d.]+ at the seam of frame 5, ")
+
+    def test_each_layer_where_there_is_no_file_of_all(self):
+        """The worst layer counts, and not the one whose folder comes first."""
+        for empty, cloudy in (("a", "b"), ("b", "a")):
+            with self.subTest(empty=empty):
+                scene = self.write("pair.toml", PAIR.replace("EMPTY", empty).replace("CLOUDY", cloudy))
+                self.call("run", scene, "--no-render", "--out", "out", "--overwrite", "--set", "density.combined=false")
+                self.assertEqual(self.failed("out", "--seam", "--max-change", 0.05), ["motion", "seam"])
+                checks = self.checks("out", "--seam", "--max-change", 0.05, status=1)
+                self.assertRegex(checks["seam"]["detail"], rf"^x: [\d.]+ at the seam of frame \d of layer {cloudy}, .*\(the seam shows\)")
+                self.assertIn(f"largest change of a voxel of layer {cloudy} ", checks["motion"]["detail"])
+                self.assertGreater(self.checks("out")["motion"]["figures"]["largest_change"], 0.05)
+                # What was not read of a layer is said.
+                for file in (self.folder / "out/density" / cloudy).glob("*.vdb"):
+                    file.write_text("damaged")
+                detail = self.checks("out", "--max-change", 0.05, status=1)["motion"]["detail"]
+                self.assertEqual(detail, f"layer {cloudy}: no density file could be read")
+
+    def test_frames_beside_a_damaged_one(self):
+        """They do not follow each other, and no file of a layer stands in for that of all."""
+        def changed(folder):
+            return self.checks(folder, status=1)["motion"]["figures"]["largest_change"]
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        largest = self.checks("out")["motion"]["figures"]["largest_change"]
+        (self.folder / "out/density/tiny_0003.vdb").write_text("damaged")
+        self.assertTrue(0 < changed("out") <= largest, changed("out"))
+        scene = self.write("pair.toml", PAIR.replace("EMPTY", "a").replace("CLOUDY", "b"))
+        self.call("run", scene, "--no-render", "--out", "pair")
+        largest = self.checks("pair")["motion"]["figures"]["largest_change"]
+        shutil.copytree(self.folder / "pair", self.folder / "layer")
+        (self.folder / "layer/density/b/pair_0003.vdb").write_text("damaged")
+        self.assertEqual(changed("layer"), largest)  # that of all is whole
+        (self.folder / "pair/density/pair_0005.vdb").write_text("damaged")
+        self.assertTrue(0 < changed("pair") <= largest, changed("pair"))
+        self.assertEqual(self.failed("pair", "--seam"), ["hashes", "seam", "voxels"])
+        # Nor do those beside one that the list has lost.
+        self.call("run", self.scene, "--no-render", "--out", "lost")
+        largest = self.checks("lost")["motion"]["figures"]["largest_change"]
+        path = self.folder / "lost/manifest.json"
+        manifest = json.loads(path.read_text())
+        del manifest["frames"][2]
+        path.write_text(unsealed(manifest))
+        self.assertTrue(0 < changed("lost") <= largest, changed("lost"))
+
+    def test_frames_of_which_none_are_compared(self):
+        """A single one, and such that cannot be read: nothing is said to agree."""
+        self.call("run", self.scene, "--no-render", "--out", "one", "--frames", "2..2")
+        motion = self.checks("one")["motion"]
+        self.assertEqual((motion["detail"], motion.get("figures")), ("not compared: there is a single frame", None))
+        self.assertIn("the check `motion` could not be done", self.call("verify", "one", "--max-change", 0, status=3).stderr)
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        files = sorted((self.folder / "out/density").glob("*.vdb"))
+        for file in files[1::2]:
+            file.write_text("damaged")
+        self.assertEqual(self.checks("out", "--max-change", 0, status=1)["motion"]["detail"],
+                         "not compared: no two frames that follow each other could be read")
+        for file in files:
+            file.write_text("damaged")
+        checks = self.checks("out", "--seam", "--max-change", 0, status=1)
+        for name in ("seam", "motion"):
+            self.assertEqual((checks[name]["done"], checks[name]["detail"]), (False, "no density file could be read"))
+        self.assertEqual(set(self.checks("out", status=1)), {"list", "frames", "files", "hashes", "voxels"})
+
     def test_impossible_numbers_and_paths_of_a_manifest(self):
         self.call("run", self.scene, "--no-render", "--out", "whole")
         whole = json.loads((self.folder / "whole/manifest.json").read_text())
@@ -304,6 +403,34 @@ class Verify(Case):
         self.assertIn(f"the same voxels in {files} files", self.checks("all", "--against", "all")["against"]["detail"])
         self.assertIn("it has no density/layered_0001.vdb", self.call("verify", "all", "--against", "layers", status=1).stdout)
         self.assertIn("it has density/layered_0001.vdb besides", self.call("verify", "layers", "--against", "all", status=1).stdout)
+
+    def test_against_a_run_of_other_frames(self):
+        """As many frames, of the same states and steps: those that only one of the two has are no agreement."""
+        for name, frames in (("a", "6..7"), ("b", "8..9"), ("c", "7..8")):
+            self.call("run", self.scene, "--no-render", "--out", name, "--frames", frames, "--set", "frames.time_scale=2")
+        for other, says in (("b", "it has no frame 6; it has no frame 7; it has frame 8 besides; and 1 more"),
+                            ("c", "it has no frame 6; it has frame 8 besides")):
+            self.assertEqual(self.failed("a", "--hashes", "--against", other), ["against"])
+            self.assertEqual(self.checks("a", "--hashes", "--against", other, status=1)["against"]["detail"], says)
+        self.assertIn("the same voxels in 2 files", self.checks("a", "--hashes", "--against", "a")["against"]["detail"])
+
+    def test_the_folder_of_a_sweep(self):
+        self.call("run", self.scene, "--no-render", "--out", "a")
+        self.call("sweep", self.scene, "--axis", "field.background.act=0.01,0.02", "-r", 1, "--out", "sweep", "-q")
+        self.refused(3, "verify", "sweep", says='sweep/manifest.json: is not a manifest of a run: it is that of a "nephos sweep"')
+        self.refused(2, "verify", "a", "--hashes", "--against", "sweep",
+                     says='sweep: is no folder of a run: its manifest.json is that of a "nephos sweep"')
+        # A long name, and one for the terminal.
+        self.write("strange/manifest.json", json.dumps({"format": "\u001b[2J" * 100_000}))
+        for status, arguments in ((3, ["strange"]), (2, ["a", "--hashes", "--against", "strange"])):
+            said = self.refused(status, "verify", *arguments, says="is that of a")
+            self.assertLess(len(said.stderr), 400)
+            self.assertNotIn("\u001b", said.stderr)
+        # Nothing says that these are of something else: the run that they are of may be damaged.
+        for text in ("{", "[]", "{}", '{"format": 5}'):
+            self.write("strange/manifest.json", text)
+            self.call("verify", "strange", status=3)
+            self.assertEqual(self.failed("a", "--hashes", "--against", "strange"), ["against"])
 
     def test_a_run_that_was_resumed_into_more_steps(self):
         """Its files are, byte for byte, those of a run that had the steps from the start."""
