@@ -23,7 +23,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kFoot_m = 0.3048, kKoschmieder = 3.912, kSurface_m = 10;
+constexpr double kKoschmieder = 3.912, kSurface_m = 10;
+constexpr double kThunder_s = 1800;  // from a flash on, and to it
 // Cumulus is towering (TCU) from this depth on, the uppermost 5 % of its mass left out.
 constexpr double kTowering_m = 1200;
 
@@ -165,7 +166,9 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame, std::v
     }
     w.showers = raining > 1;
     w.snow = scene.render.precipitation.kind == PrecipitationKind::snow;
-    w.thunder = !scene.render.lightning.empty();
+    w.thunder = std::ranges::any_of(scene.render.lightning, [&](const LightningFlash& flash) {
+        return std::abs(flash.time_s - frame.time_s) <= kThunder_s;
+    });
     return w;
 }
 
@@ -245,7 +248,7 @@ std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
         MetarCloud c;
         c.amount = *amount;
         c.height_ft =
-            100 * int(std::lround(std::clamp(layer.columns.cloud_base_m / kFoot_m / 100, 0.0, 999.0)));
+            100 * int(std::lround(std::clamp(layer.columns.cloud_base_m / kFoot / 100, 0.0, 999.0)));
         if (layer.genus == "Cb") c.type = "CB";
         if (layer.towering) c.type = "TCU";
         if (layer.genus == "VV") c.amount = CloudAmount::obscured;

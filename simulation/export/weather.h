@@ -38,7 +38,8 @@ struct WeatherSummary {
     double surface_from_deg = 0, surface_m_per_s = 0;  // at 10 m; true
     double visibility_m = 9999;                        // of the fog; 9999: none
     double rain_mm_per_h = 0;
-    bool snow = false, showers = false, thunder = false;
+    bool snow = false, showers = false;
+    bool thunder = false;  // a flash is within half an hour of the frame
     std::string
         precipitation;  // what falls as reports write it, such as "FZRA"; empty: the scene does not name it
     double fog_depth_m = 0;               // scale height; 0: none

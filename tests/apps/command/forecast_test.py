@@ -31,6 +31,14 @@ class Forecast(Case):
     def scene_of(self, forecast, *arguments):
         return tomllib.loads(self.call("metar", forecast, "-q", *arguments).stdout)
 
+    def reports_of(self, forecast, *times_s):
+        """The words of the reports that a run of a forecast's scene gives at moments that are evenly apart."""
+        self.write("told.toml", self.call("metar", forecast, "-q").stdout)
+        self.call("run", "told.toml", "--no-render", "--set", f"frames.start_s={times_s[0]}", "--set", "frames.per_second=1",
+                  "--set", f"frames.time_scale={times_s[1] - times_s[0]}", "--frames", f"1..{len(times_s)}", "--out", "told", "-q")
+        self.call("export", "told", "--to", "metar", "-o", "reports")
+        return [line.split() for line in next((self.folder / "reports").glob("*.metar.txt")).read_text().splitlines()]
+
     def said(self, forecast, *arguments):
         """The one line of an error."""
         return self.call("metar", forecast, *arguments, status=2).stderr.splitlines()[0]
@@ -173,13 +181,7 @@ class Forecast(Case):
         self.assertEqual(self.scene_of(HEAD + "SN OVC010")["wet_ground"], {"enabled": True, "initial_snow_mm": 2})
         self.assertEqual(self.scene_of(HEAD + "RA OVC010")["wet_ground"], {"enabled": True, "initial_water_mm": 1})
         self.assertEqual(self.scene_of(HEAD + "NSC FM220000 30010KT 9999 RA OVC010")["wet_ground"], {"enabled": True})
-        # Reports of a run name what falls when.
-        self.write("kinds.toml", self.call("metar", forecast, "-q").stdout)
-        self.call("run", "kinds.toml", "--no-render", "--set", "frames.start_s=36000", "--set", "frames.per_second=1", "--set", "frames.time_scale=21600",
-                  "--frames", "1..2", "--out", "kinds", "-q")
-        self.call("export", "kinds", "--to", "metar", "-o", "kinds-told")
-        told = [line.split() for line in next((self.folder / "kinds-told").glob("*.metar.txt")).read_text().splitlines()]
-        self.assertEqual(["RA" in told[0], "SN" in told[0], "RA" in told[1], "SN" in told[1]], [True, False, False, True], told)
+        self.assertEqual([("RA" in told, "SN" in told) for told in self.reports_of(forecast, 36000, 57600)], [(True, False), (False, True)])
 
     def test_thunder_is_when_it_is_forecast(self):
         scene = self.scene_of(HEAD + "FEW020 FM220000 30010KT 9999 TSRA SCT015 SCT030CB FM220400 30010KT 9999 NSC FM220900 30010KT 9999 TS FEW040CB FM220910 30010KT CAVOK")
@@ -191,6 +193,10 @@ class Forecast(Case):
         self.assertAlmostEqual(hours[4], 21.1, delta=0.2)
         self.assertTrue(all(flash["time_s"] % 300 == 0 for flash in flashes), hours)  # frames are so far apart
         self.assertAlmostEqual(flashes[0]["position_m"][2], 3000 * 0.3048 + 800, places=3)  # of the tower, not of the lowest cloud
+
+        forecast = HEAD + "FEW020 FM220000 30010KT 9999 TSRA SCT030CB FM220400 30010KT 9999 NSC"
+        told = self.reports_of(forecast, 36000, 48000, 60000)
+        self.assertEqual([("TSRA" in words, "SCT030CB" in words) for words in told], [(False, False), (True, True), (False, False)], told)
 
     def test_covers_over_their_time(self):
         """What is told is what a run of the scene has at those moments, on average within half an okta of what is wanted."""
