@@ -158,8 +158,8 @@ class TafReader {
         refuse_cancelled();
     }
 
-    // Finds the month of the day on which the forecast becomes valid: that of --date, or the one after it when it was issued before the month's
-    // end.
+    // Finds the month of the day on which the forecast becomes valid: that of --date, or the one after it where the forecast was
+    // issued before the month's end.
     void set_month(int issue_day) {
         using namespace std::chrono;
         if (!date_) return;
@@ -180,17 +180,17 @@ class TafReader {
                     digits(taf_.day, 2);
     }
 
-    // The last day of the month in which the forecast becomes valid, or the last that it names.
+    // Finds the last day of the month in which the forecast becomes valid, or the last that it names.
     void set_last_day(const std::string& valid) {
         last_day_ = days_of_month_;
         if (last_day_ > 0) return;
-        for (const ReportWord& w : words_) {
-            if (begins_remarks(w.text) && &w != &words_.front() && &w > &words_[at_]) break;
+        for (std::size_t n = at_; n < words_.size() && !begins_remarks(words_[n].text); ++n) {
+            const std::string_view w = words_[n].text;
             const auto take = [&](std::string_view day) {
                 if (number(day) <= 31) last_day_ = std::max(last_day_, number(day));
             };
-            if (is_interval(w.text)) take(w.text.substr(0, 2)), take(w.text.substr(5, 2));
-            if (is_from(w.text)) take(w.text.substr(2, 2));
+            if (is_interval(w)) take(w.substr(0, 2)), take(w.substr(5, 2));
+            if (is_from(w)) take(w.substr(2, 2));
         }
         if (number(valid.substr(5, 2)) < taf_.day && last_day_ < 31)
             note("the month is taken to end on day " + std::to_string(last_day_) +
