@@ -3,8 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <utility>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -18,6 +17,7 @@ namespace nephos {
 namespace {
 
 constexpr double kTolerance = 0.1 / 8;  // of cover
+constexpr double kLeastCoverage = 0.01;
 
 // The optical cover of a layer of the scene at a moment.
 double cover_of_layer(const Scene& scene, std::size_t layer, double time_s) {
@@ -29,50 +29,63 @@ double cover_of_layer(const Scene& scene, std::size_t layer, double time_s) {
         .cover;
 }
 
-// Chooses the coverage of the scene's layer `n`, which is `wanted`, for the mean of its covers at some moments, and sets it.
+// Measures the optical cover of the scene's layer `n` with a coverage, which it gets: the mean of some moments.
+void measure(Scene& scene, std::size_t n, double coverage, std::span<const double> moments_s,
+             FittedLayer& fit) {
+    // A coverage of few digits makes a scene that people can read.
+    fit.coverage = scene.layers[n].veil.coverage = std::round(coverage * 1000) / 1000;
+    ++fit.tries;
+    fit.cover = 0;
+    fit.least_cover = 1;
+    fit.most_cover = 0;
+    for (const double time_s : moments_s) {
+        const double cover = cover_of_layer(scene, n, time_s);
+        fit.cover += cover / double(moments_s.size());
+        fit.least_cover = std::min(fit.least_cover, cover);
+        fit.most_cover = std::max(fit.most_cover, cover);
+    }
+}
+
+// Chooses the coverage of the scene's layer `n`, which is `wanted`, by bisection for the mean of some moments.
 FittedLayer fit_layer(Scene& scene, std::size_t n, const MetarLayer& wanted,
-                      const std::vector<double>& moments_s) {
+                      std::span<const double> moments_s) {
     FittedLayer fit;
     fit.layer = wanted;
-    const auto measure = [&](double value) {
-        // A coverage of few digits makes a scene that people can read.
-        fit.coverage = scene.layers[n].veil.coverage = std::round(value * 1000) / 1000;
-        ++fit.tries;
-        fit.cover = 0;
-        fit.least_cover = 1;
-        fit.most_cover = 0;
-        for (const double time_s : moments_s) {
-            const double cover = cover_of_layer(scene, n, time_s);
-            fit.cover += cover / double(moments_s.size());
-            fit.least_cover = std::min(fit.least_cover, cover);
-            fit.most_cover = std::max(fit.most_cover, cover);
-        }
-    };
     if (wanted.sheet) {
-        measure(1);
+        measure(scene, n, 1, moments_s, fit);
         return fit;
     }
-    double low = 0.01, high = 1;
+    double low = kLeastCoverage, high = 1;
     while (fit.tries < kMostTries) {
         const double middle = (low + high) / 2;
-        measure(middle);
+        measure(scene, n, middle, moments_s, fit);
         if (std::abs(fit.cover - wanted.cover) <= kTolerance) break;
         (fit.cover < wanted.cover ? low : high) = middle;
     }
     return fit;
 }
 
-// Fits layers of a scene in which they come first; `moments_of` gives the moments of each.
-void fit_layers(FittedScene& fitted, Scene scene, const std::vector<MetarLayer>& layers,
-                const std::function<std::vector<double>(std::size_t)>& moments_of) {
-    for (std::size_t n = 0; n < layers.size(); ++n) {
-        fitted.layers.push_back(fit_layer(scene, n, layers[n], moments_of(n)));
-        const FittedLayer& fit = fitted.layers.back();
-        if (std::abs(fit.cover - layers[n].cover) > 0.5 / 8)
-            fitted.notes.push_back(
-                fmt::format("{}: the cover of {:.2f} is not met within half an okta: it is {:.2f}",
-                            layers[n].group, layers[n].cover, fit.cover));
+// The same for many moments, of which few are looked at first: what all of them are off is then made good by as much coverage.
+FittedLayer fit_layer_over_time(Scene& scene, std::size_t n, const TafLayer& layer, const Taf& taf) {
+    const MetarLayer& wanted = layer.layer;
+    FittedLayer fit = fit_layer(scene, n, wanted, moments_of(taf, layer, kFirstTafMoments));
+    const std::vector<double> moments_s = moments_of(taf, layer, kTafMoments);
+    measure(scene, n, fit.coverage, moments_s, fit);
+    for (int round = 0; round < 3 && !wanted.sheet; ++round) {
+        if (std::abs(fit.cover - wanted.cover) <= 2 * kTolerance) break;
+        measure(scene, n, std::clamp(fit.coverage + wanted.cover - fit.cover, kLeastCoverage, 1.0), moments_s,
+                fit);
     }
+    return fit;
+}
+
+// Takes a layer, and notes where its cover is not met.
+void add(FittedScene& fitted, const FittedLayer& fit) {
+    fitted.layers.push_back(fit);
+    if (std::abs(fit.cover - fit.layer.cover) > 0.5 / 8)
+        fitted.notes.push_back(
+            fmt::format("{}: the cover of {:.2f} is not met within half an okta: it is {:.2f}",
+                        fit.layer.group, fit.layer.cover, fit.cover));
 }
 
 std::vector<double> coverage_of(const FittedScene& fitted) {
@@ -88,8 +101,9 @@ FittedScene fit_metar(const Metar& metar, const MetarSceneOptions& options) {
     const std::vector<MetarLayer> layers = layers_of(metar);
     Scene scene = read_scene_text(metar_scene_text(metar, options, std::vector<double>(layers.size(), 1.0)),
                                   "the scene of the report");
-    const double first_frame_s = scene.frames.start_s;
-    fit_layers(fitted, std::move(scene), layers, [&](std::size_t) { return std::vector{first_frame_s}; });
+    const std::vector first_frame_s{scene.frames.start_s};
+    for (std::size_t n = 0; n < layers.size(); ++n)
+        add(fitted, fit_layer(scene, n, layers[n], first_frame_s));
     fitted.text = metar_scene_text(metar, options, coverage_of(fitted));
     for (std::string& note : metar_notes(metar, options)) fitted.notes.push_back(std::move(note));
     return fitted;
@@ -98,13 +112,11 @@ FittedScene fit_metar(const Metar& metar, const MetarSceneOptions& options) {
 FittedScene fit_taf(const Taf& taf, const MetarSceneOptions& options) {
     static_assert(kMostTafLayers <= kMaxLayers && kMostDetailedTafLayers <= kMaxDetailedClouds);
     FittedScene fitted;
-    const std::vector<TafLayer> timed = layers_of(taf);
-    std::vector<MetarLayer> layers;
-    for (const TafLayer& layer : timed) layers.push_back(layer.layer);
+    const std::vector<TafLayer> layers = layers_of(taf);
     Scene scene = read_scene_text(taf_scene_text(taf, options, std::vector<double>(layers.size(), 1.0)),
                                   "the scene of the forecast");
-    fit_layers(fitted, std::move(scene), layers,
-               [&](std::size_t n) { return moments_of(taf, timed[n], kTafMoments); });
+    for (std::size_t n = 0; n < layers.size(); ++n)
+        add(fitted, fit_layer_over_time(scene, n, layers[n], taf));
     fitted.text = taf_scene_text(taf, options, coverage_of(fitted));
     for (std::string& note : taf_notes(taf, options)) fitted.notes.push_back(std::move(note));
     return fitted;

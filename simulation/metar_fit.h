@@ -32,9 +32,10 @@ struct FittedScene {
 inline constexpr int kMostTries = 10;
 FittedScene fit_metar(const Metar& metar, const MetarSceneOptions& options);
 
-// The same for a forecast: the cover of a layer is met on average over `kTafMoments` moments of the time in which it is there, as
-// clouds that drift through the scene's box make it now more, now less.
-inline constexpr int kTafMoments = 4;
+// The same for a forecast: the cover of a layer is met within two tenths of an okta on average over `kTafMoments` moments of the
+// time in which it is there, as clouds that drift through the scene's box make it now more, now less. It is chosen over the
+// first few of them and then corrected.
+inline constexpr int kFirstTafMoments = 6, kTafMoments = 48;
 FittedScene fit_taf(const Taf& taf, const MetarSceneOptions& options);
 
 }  // namespace nephos

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,8 +35,8 @@ struct VerifyOptions {
     // The largest change of a voxel from frame to frame that passes; none: it is reported and always passes. Of the files of all
     // layers together, or of those of each layer where the scene writes no others; likewise seams.
     std::optional<double> max_change;
-    // Makes a seam that shows (Seam::shows) a failure, in every frame, also of an axis that is not periodic. Otherwise that of the
-    // last frame is reported: of few planes with little cloud the roughest lies at the seam by chance.
+    // Makes a seam that shows (Seam::shows) in the mean of all frames a failure, also of an axis that is not periodic. Otherwise that
+    // of the last frame is reported: of few planes with little cloud the roughest lies at the seam by chance.
     bool seam = false;
 };
 
@@ -67,19 +68,26 @@ std::vector<Check> check_files(const std::filesystem::path& folder, const std::v
 // Error(io) as open_regular_file().
 Check check_list(const std::filesystem::path& list);
 
-// The roughness of a volume where it would meet its own repetition along an axis, 0 = x, against its inside: mean
-// absolute second differences across planes of voxels. Density, x fastest, size.x * size.y * size.z of it.
+// The roughness of a volume where it would meet its own repetition along an axis, against its inside: that of planes of voxels,
+// or the mean of several moments.
 //
 // In a volume that repeats, the planes at the seam are planes like all others, so that one time in n / 2 the roughest of
 // all n lies there by chance. What shows is therefore judged by how much planes differ: a seam shows when it is rougher
 // than the roughest plane inside, and lies further above the mean of those inside than four times their standard deviation
-// (of planes alike, normally distributed, one in 30,000). Where clouds are cut it lies at ten to forty.
+// (of planes alike, normally distributed, one in 30,000). Where clouds are cut it lies at ten to forty. With few clouds planes are
+// not alike: those through a cloud that drifts over the seam are rough, but so are the planes beside it, while a cut is rough by
+// itself. It shows only when it is half as rough again as these, too.
 struct Seam {
     double at_seam = 0;  // the rougher of the two planes that meet
     double inside = 0;   // the roughest of the others; 0: there are none
-    double limit = 0;    // roughness from which on the seam shows: the larger of `inside` and mean + 4 standard deviations
+    double limit =
+        0;  // roughness from which on the seam shows: the largest of `inside`, mean + 4 standard deviations and 1.5 of those beside
     bool shows() const { return at_seam > limit; }
 };
-Seam seam_of(const std::vector<float>& density, int nx, int ny, int nz, int axis);
+Seam seam_of(std::span<const double> planes);  // by the roughness of each
+
+// Returns the mean absolute second difference across each plane of voxels along an axis, 0 = x, as if the volume repeated.
+// Density: x fastest, nx * ny * nz of it.
+std::vector<double> plane_roughness(const std::vector<float>& density, int nx, int ny, int nz, int axis);
 
 }  // namespace nephos

@@ -61,12 +61,23 @@ bool shows_more(const Seam& one, const Seam& other) {
 }
 
 void measure_seams(DensitySequence& sequence, int frame, Extent e, const std::vector<float>& density) {
+    ++sequence.seam_frames;
+    sequence.seam_frame = frame;
     for (int axis = 0; axis < 2; ++axis) {
         if (!sequence.every_seam && sequence.period_m[axis] == 0) continue;
-        const Seam seam = seam_of(density, e.x, e.y, e.z, axis);
-        std::optional<FrameSeam>& worst = sequence.seams[std::size_t(axis)];
-        if (!worst || shows_more(seam, worst->seam)) worst = {frame, seam};
+        const std::vector<double> planes = plane_roughness(density, e.x, e.y, e.z, axis);
+        std::vector<double>& sums = sequence.roughness[std::size_t(axis)];
+        sums.resize(planes.size());
+        for (std::size_t n = 0; n < planes.size(); ++n) sums[n] += planes[n];
     }
+}
+
+// Returns the seam of a sequence along an axis, of the mean of all frames that were measured; none: there is none.
+std::optional<Seam> mean_seam(const DensitySequence& sequence, std::size_t axis) {
+    std::vector<double> planes = sequence.roughness[axis];
+    if (planes.empty()) return {};
+    for (double& plane : planes) plane /= sequence.seam_frames;
+    return seam_of(planes);
 }
 
 std::string of_layer(const DensitySequence& sequence) {
@@ -171,27 +182,32 @@ void finish(DensitySequence& sequence) {
 Check check_seams(std::span<const DensitySequence> sequences, bool is_demanded) {
     constexpr std::array kNames{"x", "y"};
     Check check{"seam", true, {}};
-    int files = 0;
-    for (const DensitySequence& sequence : sequences) files += sequence.files;
+    int files = 0, frame = 0;
+    for (const DensitySequence& sequence : sequences) files += sequence.seam_frames;
     for (std::size_t axis = 0; axis < kNames.size(); ++axis) {
         const DensitySequence* worst = nullptr;
-        for (const DensitySequence& sequence : sequences)
-            if (sequence.seams[axis] &&
-                (worst == nullptr || shows_more(sequence.seams[axis]->seam, worst->seams[axis]->seam)))
-                worst = &sequence;
+        Seam seam;
+        for (const DensitySequence& sequence : sequences) {
+            const std::optional<Seam> found = mean_seam(sequence, axis);
+            if (!found || (worst != nullptr && !shows_more(*found, seam))) continue;
+            worst = &sequence;
+            seam = *found;
+        }
         if (worst == nullptr) continue;
-        const auto& [frame, seam] = *worst->seams[axis];
         check.passed = check.passed && !(is_demanded && seam.shows());
         check.detail +=
-            fmt::format("{}{}: {:.3g} at the seam of frame {}{}, at most {:.3g} inside, shows above {:.3g}{}",
-                        check.detail.empty() ? "" : "; ", kNames[axis], seam.at_seam, frame, of_layer(*worst),
+            fmt::format("{}{}: {:.3g} at the seam{}, at most {:.3g} inside, shows above {:.3g}{}",
+                        check.detail.empty() ? "" : "; ", kNames[axis], seam.at_seam, of_layer(*worst),
                         seam.inside, seam.limit, seam.shows() ? " (the seam shows)" : "");
+        frame = worst->seam_frame;
         check.figures.emplace_back(fmt::format("{}_seam", kNames[axis]), seam.at_seam);
         check.figures.emplace_back(fmt::format("{}_inside", kNames[axis]), seam.inside);
         check.figures.emplace_back(fmt::format("{}_limit", kNames[axis]), seam.limit);
     }
     if (is_demanded && !check.detail.empty())
-        check.detail += fmt::format("; the worst of {} density files", files);
+        check.detail += fmt::format("; the mean of {} density files", files);
+    else if (!check.detail.empty())
+        check.detail += fmt::format("; of frame {}", frame);
     check = with_reasons(std::move(check), reasons(sequences, why_no_seam), is_demanded);
     if (check.detail.empty()) check.detail = "no axis repeats";
     return check;
@@ -219,40 +235,45 @@ Check check_motion(std::span<const DensitySequence> sequences, const std::option
     return with_reasons(std::move(check), reasons(sequences, why_no_motion), most.has_value());
 }
 
-Seam seam_of(const std::vector<float>& density, int nx, int ny, int nz, int axis) {
-    const int n = axis == 0 ? nx : axis == 1 ? ny : nz;
-    const std::size_t planes_along = std::size_t(n);
+std::vector<double> plane_roughness(const std::vector<float>& density, int nx, int ny, int nz, int axis) {
+    const std::size_t n = std::size_t(axis == 0 ? nx : axis == 1 ? ny : nz);
     const std::size_t stride = axis == 0   ? 1
                                : axis == 1 ? std::size_t(nx)
                                            : std::size_t(nx) * std::size_t(ny);
-    std::vector<double> planes(planes_along, 0.0);
-    for (std::size_t slab = 0; slab < density.size(); slab += stride * planes_along) {
+    std::vector<double> planes(n, 0.0);
+    for (std::size_t slab = 0; slab < density.size(); slab += stride * n) {
         const auto plane = [&](std::size_t k) { return density.data() + slab + k * stride; };
-        for (std::size_t k = 0; k < planes_along; ++k) {
-            const float* before = plane(k == 0 ? planes_along - 1 : k - 1);
+        for (std::size_t k = 0; k < n; ++k) {
+            const float* before = plane(k == 0 ? n - 1 : k - 1);
             const float* at = plane(k);
-            const float* after = plane(k + 1 == planes_along ? 0 : k + 1);
+            const float* after = plane(k + 1 == n ? 0 : k + 1);
             double& sum = planes[k];
             for (std::size_t m = 0; m < stride; ++m)
                 sum += std::abs(double(before[m]) - 2 * double(at[m]) + double(after[m]));
         }
     }
-    constexpr double kDeviations = 4;
-    const double count = double(density.size()) / n;
+    const double count = double(density.size()) / double(n);
+    for (double& sum : planes) sum /= count;
+    return planes;
+}
+
+Seam seam_of(std::span<const double> planes) {
+    constexpr double kDeviations = 4, kStep = 1.5;
+    const std::size_t n = planes.size();
     Seam seam;
     double sum = 0, squares = 0;
-    for (int i = 0; i < n; ++i) {
-        const double roughness = planes[std::size_t(i)] / count;
+    for (std::size_t i = 0; i < n; ++i) {
         const bool at_seam = i == 0 || i == n - 1;
         double& most = at_seam ? seam.at_seam : seam.inside;
-        most = std::max(most, roughness);
+        most = std::max(most, planes[i]);
         if (at_seam) continue;
-        sum += roughness;
-        squares += roughness * roughness;
+        sum += planes[i];
+        squares += planes[i] * planes[i];
     }
-    const double inner = std::max(1, n - 2), mean = sum / inner;
-    seam.limit =
-        std::max(seam.inside, mean + kDeviations * std::sqrt(std::max(0.0, squares / inner - mean * mean)));
+    const double inner = n > 2 ? double(n - 2) : 1, mean = sum / inner;
+    const double deviation = std::sqrt(std::max(0.0, squares / inner - mean * mean));
+    const double beside = n > 2 ? std::max(planes[1], planes[n - 2]) : 0;
+    seam.limit = std::max({seam.inside, mean + kDeviations * deviation, kStep * beside});
     return seam;
 }
 

@@ -17,12 +17,6 @@
 
 namespace nephos {
 
-// The seam of one frame along an axis.
-struct FrameSeam {
-    int frame = 0;
-    Seam seam;
-};
-
 // A sequence of density files, one a frame, of all layers together or of one, and what was measured of it.
 struct DensitySequence {
     std::string layer;  // its name; empty: the files are of all layers together, or the scene has none
@@ -30,7 +24,10 @@ struct DensitySequence {
     // Seams are measured in every frame, along x and y; otherwise in the last one, along axes that repeat.
     bool every_seam = false;
 
-    std::array<std::optional<FrameSeam>, 2> seams;  // along x and y: of the frame where it shows most
+    // Of each plane along x and y, as plane_roughness() gives it, the sum of all frames in which it was measured: clouds drift over
+    // a seam, while one that shows is there in all frames.
+    std::array<std::vector<double>, 2> roughness;
+    int seam_frames = 0, seam_frame = 0;            // how many, and the last of them
     double change = 0;                              // the largest of a voxel from a frame to the next
     // The largest of the sum of gradients along x, as a part of it, by which pulsing between steps shows.
     double sharpness_change = 0;

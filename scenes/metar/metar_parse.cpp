@@ -34,9 +34,7 @@ class Reader {
                 ErrorCode::usage,
                 "the report is empty: expected one such as EGLL 211350Z 24012KT 9999 FEW020 14/08 Q1017");
         while (is("METAR") || is("SPECI") || is("COR")) take("kind of report", false);
-        if (done() || word().size() != 4 || !std::ranges::all_of(word(), [](char c) {
-                return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-            }))
+        if (done() || !is_aerodrome(word()))
             fail("expected the four capital letters of an aerodrome, such as EGLL");
         metar_.station = word();
         take("aerodrome");
@@ -80,11 +78,10 @@ class Reader {
                 return (group.meaning.starts_with("cloud") && group.meaning != "clouds unknown") ||
                        group.meaning.starts_with("weather") || group.meaning.starts_with("sky obscured");
             });
-            std::string caret;
-            if (excluded != metar_.groups.end())
-                caret = "\n  " + std::string(excluded->column, ' ') + std::string(excluded->text.size(), '^');
-            throw Error(ErrorCode::usage, "CAVOK excludes clouds and weather, but the report has them:\n  " +
-                                              metar_.text + caret);
+            const auto at = std::ranges::find(words_, excluded != metar_.groups.end() ? excluded->column : 0,
+                                              &ReportWord::column);
+            fail_at(report_, std::size_t(at - words_.begin()),
+                    "CAVOK excludes clouds and weather, but the report has them");
         }
         return std::move(metar_);
     }
@@ -112,7 +109,9 @@ class Reader {
         if (read_wind() || read_visibility() || read_sky() || read_temperature() || read_pressure() ||
             read_other() || read_weather())
             return;
-        if (is_interval(word())) fail("expected groups of a report: the text of a forecast begins with TAF");
+        if (is_interval(word()))
+            fail(forecast_ ? "expected BECMG, TEMPO, INTER or PROB in front of the time of a change"
+                           : "expected groups of a report: the text of a forecast begins with TAF");
         if (!lenient_) fail("expected wind, visibility, weather, clouds, temperature or pressure");
         metar_.warnings.push_back("`" + word() + "` is no group that is known, and was left out");
         take("not understood", false);
@@ -359,7 +358,8 @@ class Reader {
             metar_.temperature_c = temperature;
             metar_.dew_point_c = dew;
         }
-        take(temperature ? "temperature and dew point" : "temperature unknown", temperature.has_value());
+        take(temperature ? "temperature and dew point" : "temperature unknown",
+             temperature.has_value() && !forecast_);
         return true;
     }
 

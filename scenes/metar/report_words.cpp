@@ -18,6 +18,11 @@ int number(std::string_view text) {
     return value;
 }
 
+bool is_aerodrome(std::string_view word) {
+    return word.size() == 4 &&
+           std::ranges::all_of(word, [](char c) { return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); });
+}
+
 bool is_interval(std::string_view word) {
     return word.size() == 9 && word[4] == '/' && all_digits(word.substr(0, 4)) && all_digits(word.substr(5));
 }

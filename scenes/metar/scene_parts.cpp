@@ -131,16 +131,16 @@ Precipitation precipitation_of(const Metar& m) {
                                        : w.intensity == '+' ? 15
                                                             : 5);
         p.any = true;
-        p.snow = p.snow || code.find("SN") != code.npos || code.find("SG") != code.npos;
-        p.showers = p.showers || w.descriptor == "SH" || w.descriptor == "TS";
         if (!(rate > p.mm_per_h)) continue;
         p.mm_per_h = rate;
         p.code = code;
+        p.snow = code.find("SN") != code.npos || code.find("SG") != code.npos;
+        p.showers = w.descriptor == "SH" || w.descriptor == "TS";
     }
     return p;
 }
 
-std::vector<std::string> left_out(const Metar& m) {
+std::vector<std::string> left_out(const Metar& m, bool with_fog) {
     std::vector<std::string> notes = m.warnings;
     for (const MetarGroup& group : m.groups)
         if (!group.used) notes.push_back("`" + group.text + "` (" + group.meaning + ") is not in the scene");
@@ -160,13 +160,19 @@ std::vector<std::string> left_out(const Metar& m) {
         for (const std::string& phenomenon : w.phenomena) {
             if (code.find(phenomenon) != code.npos) continue;
             const bool plain = w.descriptor.empty();
-            if (plain && (phenomenon == "FG" || phenomenon == "BR" || phenomenon == "HZ")) continue;
-            if (phenomenon == "FG")
+            const bool haze =
+                phenomenon == "FU" || phenomenon == "DU" || phenomenon == "SA" || phenomenon == "VA";
+            const bool lessens =
+                phenomenon == "FG" || (plain && (phenomenon == "BR" || phenomenon == "HZ" || haze));
+            if (lessens && !with_fog) continue;
+            if (lessens && fog_text(m).empty())
+                notes.push_back(w.descriptor + phenomenon +
+                                " is not in the scene, as the visibility is not lessened");
+            else if (phenomenon == "FG" && !plain)
                 notes.push_back(w.descriptor + "FG is in the scene as fog everywhere");
-            else if (plain &&
-                     (phenomenon == "FU" || phenomenon == "DU" || phenomenon == "SA" || phenomenon == "VA"))
+            else if (plain && haze)
                 notes.push_back(phenomenon + " is in the scene as haze");
-            else
+            else if (!lessens)
                 notes.push_back(w.descriptor + phenomenon + " is not in the scene");
         }
     }

@@ -30,8 +30,9 @@ std::size_t kinds_of_rain(const Taf& taf);
 bool has_descriptor(const Metar& metar,
                     std::string_view descriptor);  // in a group that is not of the vicinity
 
-// Returns what groups say that a scene leaves out, a sentence each.
-std::vector<std::string> left_out(const Metar& metar);
+// Returns what groups say that a scene leaves out, a sentence each; without fog, mist and haze where the scene has not those of
+// this weather.
+std::vector<std::string> left_out(const Metar& metar, bool with_fog = true);
 
 // Returns a number with at most three decimals.
 std::string rounded_text(double value);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <optional>
 
 #include "core/error.h"
@@ -91,7 +92,9 @@ class TafReader {
         taf_.periods.push_back({"", 0, 0, std::move(weather)});
         at_ = end;
         while (at_ < words_.size()) read_change();
-        if (const std::size_t layers = layers_of(taf_).size() + kinds_of_rain(taf_); layers > kMostTafLayers)
+        for (TafPeriod& period : taf_.periods) date_weather(period);
+        if (const std::size_t layers = std::max<std::size_t>(1, layers_of(taf_).size()) + kinds_of_rain(taf_);
+            layers > kMostTafLayers)
             throw Error(ErrorCode::usage,
                         "the forecast has " + std::to_string(layers) +
                             " different groups of clouds and of what falls: expected at most " +
@@ -101,9 +104,6 @@ class TafReader {
 
   private:
     [[noreturn]] void fail(const std::string& expected) const { fail_at(report_, at_, expected); }
-    [[noreturn]] void fail_at_word(std::size_t at, const std::string& expected) const {
-        fail_at(report_, at, expected);
-    }
     bool done() const { return at_ >= words_.size(); }
     const std::string& word() const { return words_[at_].text; }
     bool is(std::string_view text) const { return !done() && word() == text; }
@@ -111,11 +111,22 @@ class TafReader {
         if (std::ranges::find(taf_.notes, text) == taf_.notes.end()) taf_.notes.push_back(text);
     }
 
+    // Gives the weather of a period its aerodrome, and the moment from which on it is wholly there.
+    void date_weather(TafPeriod& period) const {
+        const int minutes = taf_.hour * 60 + int(std::lround(period.until_s / 60));
+        const int day = taf_.day + minutes / (24 * 60);
+        period.weather.station = taf_.station;
+        period.weather.day = day > last_day_ ? day - last_day_ : day;
+        period.weather.hour = minutes / 60 % 24;
+        period.weather.minute = minutes % 60;
+    }
+
     // Throws on a second forecast in between.
     std::size_t next_change() const {
         std::size_t n = at_;
         for (; n < words_.size() && !begins_change(words_[n].text) && !begins_remarks(words_[n].text); ++n)
-            if (words_[n].text == "TAF") fail_at_word(n, "expected one forecast, but another begins here");
+            if (words_[n].text == "TAF")
+                fail_at(report_, n, "expected one forecast, but another begins here");
         return n;
     }
 
@@ -126,14 +137,16 @@ class TafReader {
 
     void read_head() {
         while (is("TAF") || is("AMD") || is("COR")) ++at_;
-        if (done() || word().size() != 4)
+        if (done() || !is_aerodrome(word()))
             fail("expected the four capital letters of an aerodrome, such as EGLL");
         taf_.station = words_[at_++].text;
         // The moment of issue may be missing.
         int issue_day = 0;
         if (!done() && word().size() == 7 && word().back() == 'Z') {
-            if (!all_digits(word().substr(0, 6)) || number(word().substr(0, 2)) < 1 ||
-                number(word().substr(0, 2)) > 31)
+            const std::string& issue = word();
+            if (!all_digits(issue.substr(0, 6)) || number(issue.substr(0, 2)) < 1 ||
+                number(issue.substr(0, 2)) > 31 || number(issue.substr(2, 2)) > 23 ||
+                number(issue.substr(4, 2)) > 59)
                 fail("expected day and time of issue (UTC), such as 211100Z");
             issue_day = number(words_[at_++].text.substr(0, 2));
         }
@@ -158,19 +171,22 @@ class TafReader {
         refuse_cancelled();
     }
 
-    // Finds the month of the day on which the forecast becomes valid: that of --date, or the one after it where the forecast was
-    // issued before the month's end.
+    // Finds the month of the day on which the forecast becomes valid: that of --date, or a neighbour where the day of issue lies
+    // beyond the month's end. A forecast is issued some hours before, or while it is valid.
     void set_month(int issue_day) {
         using namespace std::chrono;
         if (!date_) return;
-        year_month valid = date_->month;
-        const bool next = issue_day > taf_.day;
         if (date_->day != 0 && date_->day != issue_day && date_->day != taf_.day)
             throw Error(
                 ErrorCode::usage,
                 "--date '" + date_text_ + "' does not fit the forecast's day " + std::to_string(taf_.day) +
                     ": expected a month such as 2024-06, or that day of one, of the years 1900 to 2100");
-        if (next && date_->day != taf_.day) valid += months(1);
+        year_month valid = date_->month;
+        constexpr int kHalfMonth = 15;
+        if (issue_day != 0 && date_->day != taf_.day) {
+            if (issue_day - taf_.day > kHalfMonth) valid += months(1);
+            if (taf_.day - issue_day > kHalfMonth) valid -= months(1);
+        }
         days_of_month_ = int(unsigned((valid / last).day()));
         const auto digits = [](int value, std::size_t width) {
             const std::string text = std::to_string(value);
@@ -182,8 +198,9 @@ class TafReader {
 
     // Finds the last day of the month in which the forecast becomes valid, or the last that it names.
     void set_last_day(const std::string& valid) {
-        last_day_ = days_of_month_;
-        if (last_day_ > 0) return;
+        const bool goes_on = number(valid.substr(5, 2)) < taf_.day;
+        last_day_ = days_of_month_ > 0 ? days_of_month_ : goes_on ? taf_.day : 31;
+        if (days_of_month_ > 0 || !goes_on) return;
         for (std::size_t n = at_; n < words_.size() && !begins_remarks(words_[n].text); ++n) {
             const std::string_view w = words_[n].text;
             const auto take = [&](std::string_view day) {
@@ -192,7 +209,7 @@ class TafReader {
             if (is_interval(w)) take(w.substr(0, 2)), take(w.substr(5, 2));
             if (is_from(w)) take(w.substr(2, 2));
         }
-        if (number(valid.substr(5, 2)) < taf_.day && last_day_ < 31)
+        if (last_day_ < 31)
             note("the month is taken to end on day " + std::to_string(last_day_) +
                  ", the last that the forecast names: --date says which month it is");
     }
@@ -205,7 +222,7 @@ class TafReader {
     int last_of_month() const { return days_of_month_ > 0 ? days_of_month_ : 31; }
     std::string last_of_month_text() const {
         return std::to_string(last_of_month()) +
-               (days_of_month_ > 0 ? ", the last of the month of --date" : "");
+               (days_of_month_ > 0 ? ", the last of the month in which it becomes valid" : "");
     }
 
     // Seconds after the beginning of validity of a day and an hour, "2118".
@@ -218,7 +235,7 @@ class TafReader {
     // The groups from here to `end`; those that are left out are noted.
     Metar weather_of(std::size_t end) {
         Metar metar = parse_groups(report_, at_, end, lenient_);
-        for (const std::string& text : left_out(metar)) note(text);
+        for (const std::string& text : left_out(metar, taf_.periods.empty())) note(text);
         return metar;
     }
 
@@ -268,7 +285,7 @@ class TafReader {
     // Changes come by the time at which they begin.
     void require_order(std::size_t at, double begin_s) {
         if (begin_s < last_begin_s_ || begin_s >= taf_.length_s)
-            fail_at_word(at, "expected changes in the order of time, within the validity");
+            fail_at(report_, at, "expected changes in the order of time, within the validity");
         last_begin_s_ = begin_s;
     }
 
@@ -277,13 +294,12 @@ class TafReader {
         const std::size_t first = at_;
         const std::string moment_text = word();
         if (!is_from(moment_text) || !is_moment(moment_text.substr(2, 4)) ||
-            number(moment_text.substr(6)) > 59)
+            number(moment_text.substr(6)) > (moment_text.substr(4, 2) == "24" ? 0 : 59))
             fail("expected day, hour and minute of the change, such as FM211530, with days up to " +
                  last_of_month_text());
         const double moment_s = moment(moment_text.substr(2, 4), number(moment_text.substr(6)));
         const bool twice = taf_.periods.back().change.starts_with("FM") && moment_s <= last_begin_s_;
-        if (twice || (taf_.periods.size() > 1 && moment_s < 0))
-            fail("expected changes in the order of time, within the validity");
+        if (twice) fail("expected changes in the order of time, within the validity");
         require_order(first, moment_s);
         ++at_;
         const std::size_t end = next_change();

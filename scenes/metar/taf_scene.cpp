@@ -133,21 +133,37 @@ std::string rain_text(const Taf& taf, double base_m) {
     return text + falling_text(snow, first.any && first.snow == snow);
 }
 
-// A flash in the middle of each hour of thunder, on a frame; one at least.
+// The base of the cloud that lightning comes from: a cumulonimbus, or the lowest.
+double thundery_base_m(const Metar& weather) {
+    const std::vector<MetarLayer> layers = layers_of(weather);
+    const auto tower = std::ranges::find(layers, "Cb", &MetarLayer::genus);
+    if (layers.empty()) return 1000;
+    return (tower != layers.end() ? *tower : layers.front()).base_m;
+}
+
+// Flashes on frames, less than an hour apart, as long as there is thunder: none of its moments is half an hour from one.
 std::string flashes_text(const Taf& taf) {
+    constexpr double kApart_s = 3000;
+    const auto thunders = [&](std::size_t n) {
+        return n < taf.periods.size() && has_descriptor(taf.periods[n].weather, "TS");
+    };
     std::string text;
-    for (std::size_t n = 0; n < taf.periods.size(); ++n) {
-        const Metar& weather = taf.periods[n].weather;
-        if (!has_descriptor(weather, "TS")) continue;
-        double base_m = 1000;
-        const std::vector<MetarLayer> layers = layers_of(weather);
-        const auto tower = std::ranges::find(layers, "Cb", &MetarLayer::genus);
-        if (!layers.empty()) base_m = (tower != layers.end() ? *tower : layers.front()).base_m;
-        const Stretch full = full_stretch(taf, n, n + 1);
-        const double first_s = kStep_s * std::ceil(full.begin_s / kStep_s);
-        if (!(first_s + kHour_s / 2 < full.end_s)) text += lightning_text(base_m, first_s);
-        for (double time_s = first_s + kHour_s / 2; time_s < full.end_s; time_s += kHour_s)
-            text += lightning_text(base_m, time_s);
+    for (std::size_t first = 0; first < taf.periods.size(); ++first) {
+        if (!thunders(first)) continue;
+        std::size_t end = first + 1;
+        while (thunders(end)) ++end;
+        const Stretch full = full_stretch(taf, first, end);
+        const double length_s = full.end_s - full.begin_s;
+        const int count = std::max(1, int(std::ceil(length_s / kApart_s)));
+        for (int k = 0; k < count; ++k) {
+            const double time_s =
+                kStep_s * std::round((full.begin_s + (k + 0.5) / count * length_s) / kStep_s);
+            if (time_s > taf.length_s) continue;
+            std::size_t period = first;
+            while (period + 1 < end && taf.periods[period + 1].from_s <= time_s) ++period;
+            text += lightning_text(thundery_base_m(taf.periods[period].weather), time_s);
+        }
+        first = end;
     }
     return text;
 }
@@ -230,13 +246,10 @@ std::vector<std::string> taf_notes(const Taf& taf, const MetarSceneOptions& opti
     std::vector<std::string> notes;
     if (taf.date.empty() || !options.place)
         notes.push_back("the sun is not that of the forecast: it takes --date and --at");
-    const auto visibility = [](const TafPeriod& period) {
-        return period.weather.visibility_m.value_or(9999);
-    };
-    if (std::ranges::any_of(taf.periods, [&](const TafPeriod& p) {
-            return visibility(p) != visibility(taf.periods.front());
-        }))
-        notes.push_back("visibility that changes is not in the scene: it is that of the beginning");
+    const std::string fog = fog_text(taf.periods.front().weather);
+    if (std::ranges::any_of(taf.periods, [&](const TafPeriod& p) { return fog_text(p.weather) != fog; }))
+        notes.push_back(
+            "visibility, fog, mist or haze that changes is not in the scene: it is that of the beginning");
     if (const Falling falling = falling_of(taf); falling.rain && falling.snow)
         notes.push_back(std::string("rain and snow fall: all of it is drawn as ") +
                         (falling.drawn_as_snow ? "snow" : "rain") + ", of which more falls");

@@ -116,6 +116,14 @@ DensityGrid listed_density(const RunListing& run, const ListedFrame& frame,
     return density;
 }
 
+// Returns whether it rains all over the box of an area's layer, as steady rain does, two of which overlap in a change.
+bool is_over_its_box(const Scene& scene, const RainRecord& area) {
+    const auto layer = std::ranges::find(scene.layers, area.layer, &LayerOptions::name);
+    if (layer == scene.layers.end()) return false;
+    const double side_m = layer->placement.cell_size_m * std::max(layer->extent.x, layer->extent.y);
+    return std::min(area.semi_a_m, area.semi_b_m) >= 0.45 * side_m;
+}
+
 }  // namespace
 
 WeatherSummary summarise(const RunListing& run, const ListedFrame& frame, std::vector<std::string>& notes) {
@@ -158,13 +166,15 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame, std::v
         w.fog_depth_m = fog.height_m;
     }
     std::size_t raining = 0;
+    bool steady = false;
     for (const RainRecord& area : frame.rain) {
         if (area.intensity_mm_per_h > 0) ++raining;
+        steady = steady || (area.intensity_mm_per_h > 0 && is_over_its_box(scene, area));
         if (!(area.intensity_mm_per_h > w.rain_mm_per_h)) continue;
         w.rain_mm_per_h = area.intensity_mm_per_h;
         w.precipitation = is_precipitation(area.layer) ? area.layer : "";
     }
-    w.showers = raining > 1;
+    w.showers = raining > 1 && !steady;
     w.snow = scene.render.precipitation.kind == PrecipitationKind::snow;
     w.thunder = std::ranges::any_of(scene.render.lightning, [&](const LightningFlash& flash) {
         return std::abs(flash.time_s - frame.time_s) <= kThunder_s;
