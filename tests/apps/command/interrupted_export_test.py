@@ -8,7 +8,7 @@ import subprocess
 import time
 import unittest
 
-from case import NEPHOS, PATIENCE, Case, limit_addresses
+from case import NEPHOS, PATIENCE, SANITIZED, Case, limit_addresses
 from verify_test import PLACED
 
 
@@ -215,6 +215,7 @@ class InterruptedExport(Case):
             self.export("out", "--to", "raw")
             shutil.rmtree(self.folder / "out")
 
+    @unittest.skipIf(SANITIZED, "a sanitizer takes most of the addresses")
     def test_what_is_compressed_without_memory_is_not_written(self):
         """zlib and libpng tell a lack of memory in their own way, at any of its allocations."""
         arguments = ("--to", "nvdb", "--to", "vti", "--zip", "--to", "slices", "--frames", "3..3", "-j", "1")
@@ -232,6 +233,7 @@ class InterruptedExport(Case):
                     self.assertEqual((self.folder / "out" / file.name).read_bytes(), file.read_bytes(), (number, file.name))
         self.assertGreater(failed, 0)
 
+    @unittest.skipIf(SANITIZED, "a sanitizer takes most of the addresses")
     def test_verify_tells_a_lack_of_memory_from_damage(self):
         for name, more in (("flightgear", []), ("slices", []), ("vti", ["--zip"])):
             self.export(name, "--to", name, *more, "--frames", "3..3")
