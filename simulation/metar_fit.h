@@ -17,7 +17,7 @@ struct FittedLayer {
     double cover =
         0;  // optical, in the first frame; in a forecast the mean over the time in which it is there
     double least_cover = 0, most_cover = 0;  // of the moments of that mean
-    int tries = 0;
+    int tries = 0;                           // coverages that were measured
 };
 
 struct FittedScene {

@@ -71,17 +71,15 @@ Check check_list(const std::filesystem::path& list);
 // The roughness of a volume where it would meet its own repetition along an axis, against its inside: that of planes of voxels,
 // or the mean of several moments.
 //
-// In a volume that repeats, the planes at the seam are planes like all others, so that one time in n / 2 the roughest of
-// all n lies there by chance. What shows is therefore judged by how much planes differ: a seam shows when it is rougher
-// than the roughest plane inside, and lies further above the mean of those inside than four times their standard deviation
-// (of planes alike, normally distributed, one in 30,000). Where clouds are cut it lies at ten to forty. With few clouds planes are
-// not alike: those through a cloud that drifts over the seam are rough, but so are the planes beside it, while a cut is rough by
-// itself. It shows only when it is half as rough again as these, too.
+// In a volume that repeats, the planes at the seam are planes like all others, so that one time in n / 2 the roughest of all n lies
+// there by chance; but then clouds go through it, and the planes beside it are rough, too, while a cut is rough by itself. A seam
+// shows when it is rougher than the roughest plane inside, and twice as rough as the planes beside it. (Of 6,400 places in
+// tiles none does by chance; of 270 axes on which clouds are cut in a third of the frames 249 do.)
 struct Seam {
     double at_seam = 0;  // the rougher of the two planes that meet
     double inside = 0;   // the roughest of the others; 0: there are none
     double limit =
-        0;  // roughness from which on the seam shows: the largest of `inside`, mean + 4 standard deviations and 1.5 of those beside
+        0;  // roughness from which on the seam shows: the larger of `inside` and twice the planes beside it
     bool shows() const { return at_seam > limit; }
 };
 Seam seam_of(std::span<const double> planes);  // by the roughness of each

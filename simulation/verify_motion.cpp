@@ -258,22 +258,15 @@ std::vector<double> plane_roughness(const std::vector<float>& density, int nx, i
 }
 
 Seam seam_of(std::span<const double> planes) {
-    constexpr double kDeviations = 4, kStep = 1.5;
+    constexpr double kStep = 2;
     const std::size_t n = planes.size();
     Seam seam;
-    double sum = 0, squares = 0;
     for (std::size_t i = 0; i < n; ++i) {
-        const bool at_seam = i == 0 || i == n - 1;
-        double& most = at_seam ? seam.at_seam : seam.inside;
+        double& most = i == 0 || i == n - 1 ? seam.at_seam : seam.inside;
         most = std::max(most, planes[i]);
-        if (at_seam) continue;
-        sum += planes[i];
-        squares += planes[i] * planes[i];
     }
-    const double inner = n > 2 ? double(n - 2) : 1, mean = sum / inner;
-    const double deviation = std::sqrt(std::max(0.0, squares / inner - mean * mean));
     const double beside = n > 2 ? std::max(planes[1], planes[n - 2]) : 0;
-    seam.limit = std::max({seam.inside, mean + kDeviations * deviation, kStep * beside});
+    seam.limit = std::max(seam.inside, kStep * beside);
     return seam;
 }
 

@@ -181,6 +181,10 @@ class TafReader {
                 ErrorCode::usage,
                 "--date '" + date_text_ + "' does not fit the forecast's day " + std::to_string(taf_.day) +
                     ": expected a month such as 2024-06, or that day of one, of the years 1900 to 2100");
+        if (issue_day > int(unsigned((date_->month / last).day())) && date_->day == 0)
+            throw Error(ErrorCode::usage, "--date '" + date_text_ + "' has no day " +
+                                              std::to_string(issue_day) +
+                                              ": expected the month in which the forecast was issued");
         year_month valid = date_->month;
         constexpr int kHalfMonth = 15;
         if (issue_day != 0 && date_->day != taf_.day) {

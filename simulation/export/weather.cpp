@@ -169,10 +169,10 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame, std::v
     bool steady = false;
     for (const RainRecord& area : frame.rain) {
         if (area.intensity_mm_per_h > 0) ++raining;
-        steady = steady || (area.intensity_mm_per_h > 0 && is_over_its_box(scene, area));
         if (!(area.intensity_mm_per_h > w.rain_mm_per_h)) continue;
         w.rain_mm_per_h = area.intensity_mm_per_h;
         w.precipitation = is_precipitation(area.layer) ? area.layer : "";
+        steady = is_over_its_box(scene, area);
     }
     w.showers = raining > 1 && !steady;
     w.snow = scene.render.precipitation.kind == PrecipitationKind::snow;
