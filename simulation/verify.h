@@ -78,8 +78,7 @@ Check check_list(const std::filesystem::path& list);
 struct Seam {
     double at_seam = 0;  // the rougher of the two planes that meet
     double inside = 0;   // the roughest of the others; 0: there are none
-    double limit =
-        0;  // roughness from which on the seam shows: the larger of `inside` and twice the planes beside it
+    double limit = 0;  // from which on the seam shows: the larger of `inside` and twice the planes beside it
     bool shows() const { return at_seam > limit; }
 };
 Seam seam_of(std::span<const double> planes);  // by the roughness of each

@@ -95,7 +95,8 @@ class Forecast(Case):
             scene = self.scene_of(f"TAF AMD UUDD {issued} {valid} 24012KT 9999 FEW020", "--date", date, "--at", "55.4,37.9,179")
             self.assertEqual(scene["georeference"]["start_utc"][:13], start)
         self.assertIn("does not fit the forecast's day 1", self.said("TAF EGLL 302300Z 0100/0206 24012KT 9999 FEW020", "--date", "2024-06-29"))
-        self.assertIn("from day 01 to 30, the last of the month in which it becomes valid", self.said("TAF EGLL 312300Z 3123/0206 24012KT 9999 FEW020", "--date", "2024-06"))
+        self.assertIn("from day 01 to 30, the last of the month in which it becomes valid", self.said("TAF EGLL 3123/0206 24012KT 9999 FEW020", "--date", "2024-06"))
+        self.assertIn("--date '2024-06' has no day 31", self.said("TAF EGLL 312300Z 3123/0206 24012KT 9999 FEW020", "--date", "2024-06"))
         # A day that there is not is not taken for the month's last one.
         self.assertIn("`3318/3320`: expected days from 01 to 31", self.said("TAF EGLL 3018/0100 24012KT 9999 FEW020 BECMG 3318/3320 BKN030"))
 
