@@ -73,8 +73,9 @@ FittedLayer fit_layer_over_time(Scene& scene, std::size_t n, const TafLayer& lay
     measure(scene, n, fit.coverage, moments_s, fit);
     for (int round = 0; round < 3 && !wanted.sheet; ++round) {
         if (std::abs(fit.cover - wanted.cover) <= 2 * kTolerance) break;
-        measure(scene, n, std::clamp(fit.coverage + wanted.cover - fit.cover, kLeastCoverage, 1.0), moments_s,
-                fit);
+        const double better = std::clamp(fit.coverage + wanted.cover - fit.cover, kLeastCoverage, 1.0);
+        if (better == fit.coverage) break;
+        measure(scene, n, better, moments_s, fit);
     }
     return fit;
 }

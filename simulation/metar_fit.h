@@ -14,8 +14,7 @@ namespace nephos {
 struct FittedLayer {
     MetarLayer layer;
     double coverage = 1;  // the key that was chosen
-    double cover =
-        0;  // optical, in the first frame; in a forecast the mean over the time in which it is there
+    double cover = 0;  // optical: of the first frame, or a forecast's mean over the time in which it is there
     double least_cover = 0, most_cover = 0;  // of the moments of that mean
     int tries = 0;                           // coverages that were measured
 };

@@ -24,7 +24,7 @@ struct DensitySequence {
     // Seams are measured in every frame, along x and y; otherwise in the last one, along axes that repeat.
     bool every_seam = false;
 
-    // Of each plane along x and y, as plane_roughness() gives it, the sum of all frames in which it was measured: clouds drift over
+    // Sums plane_roughness() of each plane along x and y over all frames in which it was measured: clouds drift over
     // a seam, while one that shows is there in all frames.
     std::array<std::vector<double>, 2> roughness;
     int seam_frames = 0, seam_frame = 0;            // how many, and the last of them

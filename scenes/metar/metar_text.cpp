@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string>
 
-#include "scenes/metar/metar.h"
+#include "scenes/metar/report_words.h"
 
 namespace nephos {
 std::optional<CloudAmount> amount_of(double cover) {
@@ -23,25 +23,21 @@ std::string_view amount_text(CloudAmount amount) {
 }
 
 std::string metar_text(const Metar& m) {
-    const auto digits = [](int value, int width) {
-        std::string text = std::to_string(value);
-        return std::string(std::size_t(std::max(0, width - int(text.size()))), '0') + text;
-    };
-    std::string text = m.station + " " + digits(m.day, 2) + digits(m.hour, 2) + digits(m.minute, 2) + "Z";
+    std::string text = m.station + " " + padded(m.day, 2) + padded(m.hour, 2) + padded(m.minute, 2) + "Z";
     if (m.wind.known) {
         const int knots = int(std::lround(m.wind.speed_m_per_s / kKnot));
         const int from = (m.wind.from_deg + 5) / 10 * 10;
         const std::string direction = knots == 0        ? "000"
                                       : m.wind.variable ? "VRB"
-                                                        : digits(from == 0 ? 360 : from, 3);
-        text += " " + direction + digits(knots, 2);
-        if (m.wind.gust_m_per_s) text += "G" + digits(int(std::lround(*m.wind.gust_m_per_s / kKnot)), 2);
+                                                        : padded(from == 0 ? 360 : from, 3);
+        text += " " + direction + padded(knots, 2);
+        if (m.wind.gust_m_per_s) text += "G" + padded(int(std::lround(*m.wind.gust_m_per_s / kKnot)), 2);
         text += "KT";
     } else {
         text += " /////KT";
     }
     if (m.cavok) return text + " CAVOK";
-    text += m.visibility_m ? " " + digits(*m.visibility_m, 4) : " ////";
+    text += m.visibility_m ? " " + padded(*m.visibility_m, 4) : " ////";
     for (const MetarWeather& w : m.weather) {
         text += ' ';
         if (w.intensity != 0) text += w.intensity;
@@ -51,14 +47,14 @@ std::string metar_text(const Metar& m) {
     }
     for (const MetarCloud& c : m.clouds) {
         text += " " + std::string(amount_text(c.amount)) +
-                (c.height_ft ? digits(*c.height_ft / 100, 3) : "///") + c.type;
+                (c.height_ft ? padded(*c.height_ft / 100, 3) : "///") + c.type;
     }
     if (m.clouds.empty()) text += " NSC";
     if (m.temperature_c && m.dew_point_c) {
-        const auto degrees = [&](int t) { return (t < 0 ? "M" : "") + digits(std::abs(t), 2); };
+        const auto degrees = [&](int t) { return (t < 0 ? "M" : "") + padded(std::abs(t), 2); };
         text += " " + degrees(*m.temperature_c) + "/" + degrees(*m.dew_point_c);
     }
-    if (m.pressure_hpa) text += " Q" + digits(int(*m.pressure_hpa), 4);
+    if (m.pressure_hpa) text += " Q" + padded(int(*m.pressure_hpa), 4);
     return text;
 }
 

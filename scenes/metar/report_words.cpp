@@ -18,6 +18,11 @@ int number(std::string_view text) {
     return value;
 }
 
+std::string padded(int value, std::size_t width) {
+    const std::string text = std::to_string(value);
+    return std::string(width - std::min(width, text.size()), '0') + text;
+}
+
 bool is_aerodrome(std::string_view word) {
     return word.size() == 4 &&
            std::ranges::all_of(word, [](char c) { return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); });

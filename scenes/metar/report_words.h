@@ -35,6 +35,7 @@ std::string joined(const ReportWords& words, std::size_t first, std::size_t end)
 
 bool all_digits(std::string_view text);  // false of an empty one
 int number(std::string_view text);       // of at most nine digits
+std::string padded(int value, std::size_t width);  // with zeros in front: "07"
 
 bool is_aerodrome(std::string_view word);  // four capital letters or digits
 bool is_interval(std::string_view word);  // "2112/2218": days and hours

@@ -8,12 +8,12 @@
 #include "core/error.h"
 #include "core/place.h"
 #include "core/text.h"
+#include "scenes/metar/report_words.h"
 
 namespace nephos {
 namespace {
 
-// Of the clouds' box, which stands around the aerodrome.
-constexpr double kSide_m = 20'000;
+constexpr double kSide_m = 20'000;      // of the clouds' box, which stands around the aerodrome
 constexpr double kDeep_m = 2000;        // deeper layers have coarser cells
 constexpr double kKoschmieder = 3.912;  // -ln 0.02: contrast that an eye still sees
 
@@ -82,18 +82,17 @@ Look look_of(const std::string& genus, bool deep) {
 
 // The moment of a report's day, hour and minute: "2024-06-21T13:50:00Z".
 std::string start_of(int of_month, int hour, int minute, const MetarSceneOptions& o) {
-    const auto two = [](int n) { return (n < 10 ? "0" : "") + std::to_string(n); };
     std::string day = o.date;
-    if (day.size() == 7) day += "-" + two(of_month);
-    const std::string start = day + "T" + two(hour) + ":" + two(minute) + ":00Z";
-    if (!utc_seconds(start) || (o.date.size() == 10 && o.date.substr(8) != two(of_month)))
+    if (day.size() == 7) day += "-" + padded(of_month, 2);
+    const std::string start = day + "T" + padded(hour, 2) + ":" + padded(minute, 2) + ":00Z";
+    if (!utc_seconds(start) || (o.date.size() == 10 && o.date.substr(8) != padded(of_month, 2)))
         throw Error(ErrorCode::usage,
                     "--date '" + o.date + "' does not fit the report's day " + std::to_string(of_month) +
                         ": expected a month such as 2024-06, or that day of one, of the years 1900 to 2100");
     return start;
 }
 
-// What floats in the air and takes the view, but for fog and mist.
+// Tells whether something floats in the air that takes the view, but for fog and mist.
 bool has_haze(const Metar& m) {
     constexpr std::string_view kDry[] = {"HZ", "FU", "DU", "SA", "VA"};
     return std::ranges::any_of(kDry,

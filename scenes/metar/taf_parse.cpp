@@ -192,12 +192,8 @@ class TafReader {
             if (taf_.day - issue_day > kHalfMonth) valid -= months(1);
         }
         days_of_month_ = int(unsigned((valid / last).day()));
-        const auto digits = [](int value, std::size_t width) {
-            const std::string text = std::to_string(value);
-            return std::string(width - std::min(width, text.size()), '0') + text;
-        };
-        taf_.date = digits(int(valid.year()), 4) + "-" + digits(int(unsigned(valid.month())), 2) + "-" +
-                    digits(taf_.day, 2);
+        taf_.date = padded(int(valid.year()), 4) + "-" + padded(int(unsigned(valid.month())), 2) + "-" +
+                    padded(taf_.day, 2);
     }
 
     // Finds the last day of the month in which the forecast becomes valid, or the last that it names.
