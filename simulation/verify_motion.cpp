@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -51,13 +50,15 @@ float largest_change(const std::vector<float>& before, const std::vector<float>&
 }
 
 // Returns how far a seam stands out: above 1 it shows.
-double prominence(const Seam& seam) {
-    if (seam.limit > 0) return seam.at_seam / seam.limit;
-    return seam.at_seam > 0 ? std::numeric_limits<double>::infinity() : 0;
-}
+double prominence(const Seam& seam) { return seam.limit > 0 ? seam.at_seam / seam.limit : 0; }
 
 bool shows_more(const Seam& one, const Seam& other) {
     return std::pair(one.shows(), prominence(one)) > std::pair(other.shows(), prominence(other));
+}
+
+void add(std::vector<double>& sums, const std::vector<double>& values) {
+    sums.resize(values.size());
+    for (std::size_t n = 0; n < values.size(); ++n) sums[n] += values[n];
 }
 
 void measure_seams(DensitySequence& sequence, int frame, Extent e, const std::vector<float>& density) {
@@ -65,18 +66,19 @@ void measure_seams(DensitySequence& sequence, int frame, Extent e, const std::ve
     sequence.seam_frame = frame;
     for (int axis = 0; axis < 2; ++axis) {
         if (!sequence.every_seam && sequence.period_m[axis] == 0) continue;
-        const std::vector<double> planes = plane_roughness(density, e.x, e.y, e.z, axis);
-        std::vector<double>& sums = sequence.roughness[std::size_t(axis)];
-        sums.resize(planes.size());
-        for (std::size_t n = 0; n < planes.size(); ++n) sums[n] += planes[n];
+        const PlaneSteps planes = plane_steps(density, e.x, e.y, e.z, axis);
+        PlaneSteps& sums = sequence.planes[std::size_t(axis)];
+        add(sums.steps, planes.steps);
+        add(sums.breaks, planes.breaks);
     }
 }
 
 // Returns the seam of a sequence along an axis, of the mean of all frames that were measured; none: there is none.
 std::optional<Seam> mean_seam(const DensitySequence& sequence, std::size_t axis) {
-    std::vector<double> planes = sequence.roughness[axis];
-    if (planes.empty()) return {};
-    for (double& plane : planes) plane /= sequence.seam_frames;
+    PlaneSteps planes = sequence.planes[axis];
+    if (planes.steps.empty()) return {};
+    for (double& step : planes.steps) step /= sequence.seam_frames;
+    for (double& part : planes.breaks) part /= sequence.seam_frames;
     return seam_of(planes);
 }
 
@@ -196,7 +198,7 @@ Check check_seams(std::span<const DensitySequence> sequences, bool is_demanded) 
         if (worst == nullptr) continue;
         check.passed = check.passed && !(is_demanded && seam.shows());
         check.detail +=
-            fmt::format("{}{}: {:.3g} at the seam{}, at most {:.3g} inside, shows above {:.3g}{}",
+            fmt::format("{}{}: break of {:.3g} at the seam{}, at most {:.3g} inside, shows above {:.3g}{}",
                         check.detail.empty() ? "" : "; ", kNames[axis], seam.at_seam, of_layer(*worst),
                         seam.inside, seam.limit, seam.shows() ? " (the seam shows)" : "");
         frame = worst->seam_frame;
@@ -235,38 +237,49 @@ Check check_motion(std::span<const DensitySequence> sequences, const std::option
     return with_reasons(std::move(check), reasons(sequences, why_no_motion), most.has_value());
 }
 
-std::vector<double> plane_roughness(const std::vector<float>& density, int nx, int ny, int nz, int axis) {
+PlaneSteps plane_steps(const std::vector<float>& density, int nx, int ny, int nz, int axis) {
+    constexpr float kContinued = 1.5f;
     const std::size_t n = std::size_t(axis == 0 ? nx : axis == 1 ? ny : nz);
     const std::size_t stride = axis == 0   ? 1
                                : axis == 1 ? std::size_t(nx)
                                            : std::size_t(nx) * std::size_t(ny);
-    std::vector<double> planes(n, 0.0);
+    PlaneSteps planes{std::vector<double>(n), std::vector<double>(n)};
     for (std::size_t slab = 0; slab < density.size(); slab += stride * n) {
-        const auto plane = [&](std::size_t k) { return density.data() + slab + k * stride; };
+        const auto plane = [&](std::size_t k) {
+            return density.data() + slab + stride * (k < n ? k : k % n);
+        };
         for (std::size_t k = 0; k < n; ++k) {
-            const float* before = plane(k == 0 ? n - 1 : k - 1);
+            const float* before = plane(k + n - 1);
             const float* at = plane(k);
-            const float* after = plane(k + 1 == n ? 0 : k + 1);
-            double& sum = planes[k];
-            for (std::size_t m = 0; m < stride; ++m)
-                sum += std::abs(double(before[m]) - 2 * double(at[m]) + double(after[m]));
+            const float* next = plane(k + 1);
+            const float* behind = plane(k + 2);
+            for (std::size_t m = 0; m < stride; ++m) {
+                const float step = std::abs(next[m] - at[m]);
+                const float beside = std::max(std::abs(at[m] - before[m]), std::abs(behind[m] - next[m]));
+                planes.steps[k] += double(step);
+                planes.breaks[k] += double(std::max(0.0f, step - kContinued * beside));
+            }
         }
     }
     const double count = double(density.size()) / double(n);
-    for (double& sum : planes) sum /= count;
+    for (double& step : planes.steps) step /= count;
+    for (double& part : planes.breaks) part /= count;
     return planes;
 }
 
-Seam seam_of(std::span<const double> planes) {
-    constexpr double kStep = 2;
-    const std::size_t n = planes.size();
+Seam seam_of(const PlaneSteps& planes) {
+    constexpr double kLeastPart = 0.25, kPartsInside = 2, kBreaksInside = 1.5;
+    const std::size_t last = planes.steps.size() - 1;
     Seam seam;
-    for (std::size_t i = 0; i < n; ++i) {
-        double& most = i == 0 || i == n - 1 ? seam.at_seam : seam.inside;
-        most = std::max(most, planes[i]);
+    double steps = 0, breaks = 0;
+    for (std::size_t k = 0; k < last; ++k) {
+        steps += planes.steps[k];
+        breaks += planes.breaks[k];
+        seam.inside = std::max(seam.inside, planes.breaks[k]);
     }
-    const double beside = n > 2 ? std::max(planes[1], planes[n - 2]) : 0;
-    seam.limit = std::max(seam.inside, kStep * beside);
+    seam.at_seam = planes.breaks[last];
+    const double part = steps > 0 ? std::max(kLeastPart, kPartsInside * breaks / steps) : kLeastPart;
+    seam.limit = std::max(kBreaksInside * seam.inside, part * planes.steps[last]);
     return seam;
 }
 

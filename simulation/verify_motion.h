@@ -24,9 +24,9 @@ struct DensitySequence {
     // Seams are measured in every frame, along x and y; otherwise in the last one, along axes that repeat.
     bool every_seam = false;
 
-    // Sums plane_roughness() of each plane along x and y over all frames in which it was measured: clouds drift over
-    // a seam, while one that shows is there in all frames.
-    std::array<std::vector<double>, 2> roughness;
+    // The sums of plane_steps() along x and y over all frames in which they were measured: clouds drift over a seam, while
+    // one that shows is there in all frames.
+    std::array<PlaneSteps, 2> planes;
     int seam_frames = 0, seam_frame = 0;            // how many, and the last of them
     double change = 0;                              // the largest of a voxel from a frame to the next
     // The largest of the sum of gradients along x, as a part of it, by which pulsing between steps shows.

@@ -110,7 +110,7 @@ void add_verify_command(CLI::App& app, Action& action) {
         "to 1,\n"
         "in refined files with detail to 1 + `detail.thermals`;\n"
         "metadata agree with the manifest; layers add up to the common grid; the tables of one that is not\n"
-        "complete begin with what was saved. Reported: roughness at the seam of periodic axes in the\n"
+        "complete begin with what was saved. Reported: breaks at the seam of periodic axes in the\n"
         "last frame, largest change of a voxel and of sharpness; where there is no file of all layers "
         "together\n"
         "(`density.combined`), of the layer that is worst. Of an export: checksums, and the voxels read "

@@ -264,13 +264,19 @@ class Verify(Case):
         self.assertEqual(self.failed("a", "--against", "c"), ["against"])
         self.assertIn("it has 5 steps, not 7", self.call("verify", "a", "--against", "short", status=1).stdout)
 
-    def test_a_seam_that_is_rough_by_chance(self):
-        """In a small box with few clouds the roughest plane may be one at the seam; those beside it say that it is no cut."""
-        self.call("run", SOURCE / "scenes/shafts.toml", "--set", "lattice.cells=[24,20,12]", "--set", "time.steps=6", "--set",
-                  "frames={count=1}", "--no-render", "--out", "out")
+    def test_specks_are_no_seam(self):
+        """Of a tile whose only clouds have just formed, a few voxels thick, at its edge."""
+        tile = (SOURCE / "scenes/tile.toml").read_text().replace("genera/Cu.toml", str(SOURCE / "scenes/genera/Cu.toml"))
+        tile = tile[:tile.index('[[layer]]\nname = "Ci"')] + tile[tile.index("[density]"):]
+        tile = tile.replace("[256, 256, 32], cell_size_m = 40", "[64, 64, 32], cell_size_m = 160").replace("clouds = 45", "clouds = 2")
+        few = ("--no-render", "--seed", 281797, "--set", "frames={count=1, start_s=300}")
+        self.call("run", self.write("specks.toml", tile), *few, "--out", "out")
         figures = self.checks("out", "--seam")["seam"]["figures"]
-        self.assertGreater(figures["y_seam"], figures["y_inside"])
-        self.assertLessEqual(figures["y_seam"], figures["y_limit"])
+        self.assertGreater(max(figures["x_limit"], figures["y_limit"]), 0)  # they lie over it
+        # Grown, and cut where the wind takes them out of the box.
+        self.call("run", self.write("cut.toml", tile.replace("tile = true\n", "").replace("clouds = 2", "clouds = 45")), "--no-render",
+                  "--set", "frames={count=2, start_s=900}", "--out", "cut")
+        self.assertEqual(self.failed("cut", "--seam"), ["seam"])
 
     def test_the_seam_of_every_frame(self):
         """One that shows in frames before the last is a failure."""
@@ -278,9 +284,9 @@ class Verify(Case):
                   "--set", "field.background.ext=0.9", "--set", "field.background.hum=0.02")
         self.assertEqual(self.failed("out", "--seam"), ["seam"])
         self.assertRegex(self.checks("out", "--seam", status=1)["seam"]["detail"],
-                         r"^x: [\d.]+ at the seam, .* \(the seam shows\); y: .*; the mean of 4 density files$")
+                         r"^x: break of [\d.]+ at the seam, .* \(the seam shows\); y: .*; the mean of 4 density files$")
         self.call("run", self.scene, "--no-render", "--out", "periodic", "--set", 'lattice.boundaries=["periodic", "periodic", "open"]')
-        self.assertRegex(self.checks("periodic")["seam"]["detail"], r"^x: [\d.]+ at the seam, .*; y: [\d.]+ at the seam, .*; of frame 5$")
+        self.assertRegex(self.checks("periodic")["seam"]["detail"], r"^x: break of [\de.-]+ at the seam, .*; y: break of [\de.-]+ at the seam, .*; of frame 5$")
 
     def test_each_layer_where_there_is_no_file_of_all(self):
         """The worst layer counts, and not the one whose folder comes first."""
@@ -290,7 +296,7 @@ class Verify(Case):
                 self.call("run", scene, "--no-render", "--out", "out", "--overwrite", "--set", "density.combined=false")
                 self.assertEqual(self.failed("out", "--seam", "--max-change", 0.05), ["motion", "seam"])
                 checks = self.checks("out", "--seam", "--max-change", 0.05, status=1)
-                self.assertRegex(checks["seam"]["detail"], rf"^x: [\d.]+ at the seam of layer {cloudy}, .*\(the seam shows\)")
+                self.assertRegex(checks["seam"]["detail"], rf"^x: break of [\d.]+ at the seam of layer {cloudy}, .*\(the seam shows\)")
                 self.assertIn(f"largest change of a voxel of layer {cloudy} ", checks["motion"]["detail"])
                 self.assertGreater(self.checks("out")["motion"]["figures"]["largest_change"], 0.05)
                 # What was not read of a layer is said.
