@@ -268,17 +268,20 @@ PlaneSteps plane_steps(const std::vector<float>& density, int nx, int ny, int nz
 }
 
 Seam seam_of(const PlaneSteps& planes) {
-    constexpr double kLeastPart = 0.25, kPartsInside = 2, kBreaksInside = 1.5;
+    constexpr double kLeastPart = 0.25, kPartsInside = 2, kBreaksInside = 1.5, kStepsInside = 1.25;
     const std::size_t last = planes.steps.size() - 1;
     Seam seam;
-    double steps = 0, breaks = 0;
+    double steps = 0, breaks = 0, largest = 0;
     for (std::size_t k = 0; k < last; ++k) {
         steps += planes.steps[k];
         breaks += planes.breaks[k];
+        largest = std::max(largest, planes.steps[k]);
         seam.inside = std::max(seam.inside, planes.breaks[k]);
     }
     seam.at_seam = planes.breaks[last];
-    const double part = steps > 0 ? std::max(kLeastPart, kPartsInside * breaks / steps) : kLeastPart;
+    const bool is_steep = planes.steps[last] > kStepsInside * largest;
+    const double part =
+        is_steep || steps == 0 ? kLeastPart : std::max(kLeastPart, kPartsInside * breaks / steps);
     seam.limit = std::max(kBreaksInside * seam.inside, part * planes.steps[last]);
     return seam;
 }

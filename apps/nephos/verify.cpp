@@ -95,9 +95,10 @@ void add_verify_command(CLI::App& app, Action& action) {
     add_value(*command, "--replay", "N",
               "Simulate the first N frames anew and compare states, and voxels of files that are not refined",
               [a](const std::string& text) { a->options.replay = int(parse_integer(text, 1, kMaxFrames)); });
-    command->add_flag("--seam", a->options.seam,
-                      "Demand that the box continues into itself on both horizontal axes, periodic or not, "
-                      "in the mean of all frames");
+    command->add_flag(
+        "--seam", a->options.seam,
+        "Demand that density goes on across both horizontal axes, periodic or not, as it does inside, "
+        "in the mean of all frames (docs/flight-simulators.md, Tiles)");
     add_value(*command, "--max-change", "X", "Largest change of a voxel from frame to frame that passes",
               [a](const std::string& text) { a->options.max_change = parse_real(text, 0, 1); });
     add_threads(*command, a->work);

@@ -163,17 +163,23 @@ TEST(Seam, WhatGoesOnIsNoBreak) {
         const Seam seam = seam_of(planes);
         EXPECT_EQ(seam.at_seam, 12.5);
         EXPECT_EQ(seam.inside, 8.5);
-        EXPECT_EQ(seam.limit, 14 * 2 * 8.5 / 14);
+        EXPECT_EQ(seam.limit, 1.5 * 8.5);
     }
 }
 
-// Of a box of one or two planes nothing can be said: whatever is in it, no seam shows.
-TEST(Seam, TwoPlanesHaveNone) {
-    for (const std::vector<float>& row : {std::vector<float>{0.5f}, {0, 1}, {0.5f, 0.25f}}) {
-        const Seam seam = seam_of(plane_steps(row, int(row.size()), 1, 1, 0));
-        EXPECT_EQ(seam.at_seam, 0);
-        EXPECT_FALSE(seam.shows());
-    }
+// Where every other step is a break, one more of them is none; one that is larger is.
+TEST(Seam, BreaksEverywhereHideNoLargerOne) {
+    EXPECT_FALSE(seam_of(plane_steps({0, 0, 2, 2, 0, 0, 2, 2}, 8, 1, 1, 0)).shows());
+    const Seam seam = seam_of(plane_steps({0, 0, 2, 2, 4, 4, 6, 6}, 8, 1, 1, 0));
+    EXPECT_EQ(seam.at_seam, 6);
+    EXPECT_EQ(seam.limit, 3);
+}
+
+// Of a box of one to three planes nothing can be said: whatever is in it, no seam shows.
+TEST(Seam, ThreePlanesHaveNone) {
+    for (const std::vector<float>& row :
+         {std::vector<float>{0.5f}, {0, 1}, {0.5f, 0.25f}, {0, 0.5f, 1}, {0, 0, 1}})
+        EXPECT_FALSE(seam_of(plane_steps(row, int(row.size()), 1, 1, 0)).shows());
 }
 
 // Clouds that have just formed are a cell or two, smoothed: the seam may go through the only one.

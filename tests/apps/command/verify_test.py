@@ -49,6 +49,27 @@ top_m = 1150
 margin_m = 0
 """
 
+# A veil with hard edges.
+HARD = """\
+[frames]
+count = 2
+[time]
+step_s = 10
+steps = 60
+[[layer]]
+name = "A"
+lattice = { cells = [128, 128, 12], cell_size_m = 80, origin_m = [0, 0, 8000] }
+[layer.veil]
+form = "stratus"
+octaves = 2
+wavelength_m = 5120
+coverage = 0.5
+softness = 0.05
+margin_m = 0
+base_m = 8000
+top_m = 9000
+"""
+
 # Two layers of automata in one box: clouds grow in that of the second name, and nothing in the other.
 PAIR = """\
 seed = 3
@@ -277,6 +298,15 @@ class Verify(Case):
         self.call("run", self.write("cut.toml", tile.replace("tile = true\n", "").replace("clouds = 2", "clouds = 45")), "--no-render",
                   "--set", "frames={count=2, start_s=900}", "--out", "cut")
         self.assertEqual(self.failed("cut", "--seam"), ["seam"])
+
+    def test_a_cut_of_hard_edges(self):
+        """In a veil whose edges are as sharp as a voxel steps break everywhere, and a cut shows all the same."""
+        scene = self.write("hard.toml", HARD)
+        for seed in (1, 2):
+            self.call("run", scene, "--no-render", "--seed", seed, "--set", "tile=true", "--out", f"tile{seed}")
+            self.checks(f"tile{seed}", "--seam")
+            self.call("run", scene, "--no-render", "--seed", seed, "--out", f"cut{seed}")
+            self.assertEqual(self.failed(f"cut{seed}", "--seam"), ["seam"])
 
     def test_the_seam_of_every_frame(self):
         """One that shows in frames before the last is a failure."""
