@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 #include <string_view>
+#include <system_error>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -134,6 +135,12 @@ void keep_freed_memory() {
     mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the largest that it takes: larger blocks are mapped, and go back
     mallopt(M_TRIM_THRESHOLD, 256 << 20);
 #endif
+}
+
+bool is_lack_of_threads(const std::exception& error) {
+    const auto* of_system = dynamic_cast<const std::system_error*>(&error);
+    return (of_system != nullptr && of_system->code() == std::errc::resource_unavailable_try_again) ||
+           std::string_view(error.what()).starts_with("pthread_create has failed");
 }
 
 }  // namespace nephos

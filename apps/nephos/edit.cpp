@@ -53,10 +53,17 @@ int start_editor_program(const EditArguments& arguments) {
     std::error_code error;
     const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
     const std::string beside = (self.parent_path() / kProgram).string();
-    if (!error) execv(beside.c_str(), pointers.data());
+    const auto require_none = [](const std::string& program) {
+        if (errno != ENOENT)
+            throw Error(ErrorCode::io,
+                        fmt::format("{} cannot be started: {}", program, std::strerror(errno)));
+    };
+    if (!error) {
+        execv(beside.c_str(), pointers.data());
+        require_none(beside);
+    }
     execvp(kProgram, pointers.data());
-    if (errno != ENOENT)
-        throw Error(ErrorCode::io, fmt::format("{} cannot be started: {}", kProgram, std::strerror(errno)));
+    require_none(kProgram);
     throw Error(ErrorCode::usage,
                 "this build has no editor: install libglfw3-dev and libimgui-dev and build again, or call "
                 "`./run --edit`, "

@@ -13,7 +13,6 @@
 #include <new>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -145,13 +144,6 @@ int run_command(CLI::App& app, int argc, const char* const* argv, const EditFunc
 constexpr std::string_view kNoThread =
     "cannot start another thread: expected a higher limit of processes or addresses (`ulimit -a`), or fewer "
     "threads (-j 1)";
-
-// Tells the exceptions of the standard library and of TBB.
-bool is_lack_of_threads(const std::exception& error) {
-    const auto* of_system = dynamic_cast<const std::system_error*>(&error);
-    return (of_system != nullptr && of_system->code() == std::errc::resource_unavailable_try_again) ||
-           std::string_view(error.what()).starts_with("pthread_create has failed");
-}
 
 // The only place where exceptions end.
 int guarded(int argc, const char* const* argv, const EditFunction& edit) {

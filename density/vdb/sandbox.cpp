@@ -21,6 +21,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/memory.h"
 #include "core/text.h"
 #include "density/vdb/confinement.h"
 #include "density/vdb/sanitized.h"
@@ -476,6 +477,7 @@ void run_sandboxed(const std::filesystem::path& subject, std::string_view parser
         } catch (const std::bad_alloc&) {
             throw;  // of this process
         } catch (const std::exception& error) {
+            if (is_lack_of_threads(error)) throw;  // likewise
             const std::string message = clamp_message(error.what());
             if (message.starts_with(kCannotRead))
                 throw ReadFailure(subject, message.substr(kCannotRead.size()));

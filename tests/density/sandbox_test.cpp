@@ -13,6 +13,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -30,6 +31,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/memory.h"
 #include "density/vdb/sanitized.h"
 
 namespace nephos {
@@ -151,6 +153,24 @@ TEST(Sandbox, StartsAnewWhereNothingComes) {
     }
     EXPECT_EQ(message, "s: cannot read: it takes longer than allowed");
     EXPECT_EQ(told, 1);
+}
+
+// That this process has no thread left for what it does with a file is no fault of the file.
+TEST(Sandbox, LackOfThreadsIsNotToldOfTheFile) {
+    for (const bool of_tbb : {false, true}) {
+        const auto without_thread = [&](SandboxReader&) {
+            if (of_tbb)
+                throw std::runtime_error("pthread_create has failed: Resource temporarily unavailable");
+            throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again));
+        };
+        try {
+            run_sandboxed(
+                "subject.vdb", "OpenVDB", {}, {}, [](SandboxWriter&) {}, without_thread);
+            ADD_FAILURE() << "it was read";
+        } catch (const std::exception& error) {
+            EXPECT_TRUE(is_lack_of_threads(error)) << error.what();
+        }
+    }
 }
 
 // Expects the end of this process, by what faults.ForkedReaders preloads, where a child calls oneTBB.

@@ -3,6 +3,7 @@
 
 import json
 import os
+import pathlib
 import pty
 import re
 import select
@@ -16,6 +17,24 @@ from case import BAD, NEPHOS, PATIENCE, SCENE, Case
 
 
 class Usage(Case):
+    def test_an_editor_that_cannot_be_started_is_named(self):
+        """What is beside the command in its place is broken; nothing there is a build without one."""
+        program = self.folder / "bin/nephos"
+        program.parent.mkdir()
+        shutil.copy2(NEPHOS, program)
+        for make, reason in ((pathlib.Path.touch, "Permission denied"), (pathlib.Path.mkdir, "Permission denied"),
+                             (lambda path: (path.touch(), path.chmod(0o755)), "Exec format error"), (None, "this build has no editor")):
+            editor = program.with_name("nephos-editor")
+            if make is not None:
+                make(editor)
+            result = subprocess.run([program, "edit"], capture_output=True, text=True, timeout=PATIENCE, check=False,
+                                    env={**self.environment, "PATH": str(self.folder)})
+            says = reason if make is None else f"{editor} cannot be started: {reason}"
+            self.assertEqual((result.returncode, result.stderr.startswith(f"error: {says}")), (2 if make is None else 3, True), result.stderr)
+            if editor.is_dir():
+                editor.rmdir()
+            editor.unlink(missing_ok=True)
+
     def test_what_follows_two_dashes_is_named(self):
         for arguments, says in ((["hash", self.scene, "--", "-n", "3"], "`-n`"), (["hash", "--", self.scene, "extra"], "`extra`"), (["--", "hahs"], "`hahs`"),
                                 (["hash", self.scene, ""], "unexpected argument ``")):
