@@ -2,13 +2,19 @@
 #include "apps/nephos/arguments.h"
 
 #include <algorithm>
+#include <atomic>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <limits>
+#include <thread>
 
 #include "study/folder_contents.h"
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
 
 #include "apps/nephos/terminal.h"
 #include "core/atomic_file.h"
@@ -236,11 +242,29 @@ void print_warnings(const Scene& scene) {
     for (const std::string& warning : warnings(scene)) print_note(warning);
 }
 
-void limit_threads(int threads) {
-    if (threads <= 0) return;
-    // Never deleted; volatile, else the compiler leaves the pointer out, and the sanitizer finds a leak.
-    [[maybe_unused]] static const tbb::global_control* volatile limit = nullptr;
-    limit = new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+void start_threads(int threads) {
+    using Control = tbb::global_control;
+    if (threads > 0) {
+        // Never deleted; volatile, else the compiler leaves the pointer out, and the sanitizer finds a leak.
+        [[maybe_unused]] static const Control* volatile limit = nullptr;
+        limit = new Control(Control::max_allowed_parallelism, std::size_t(threads));
+    }
+    const int all = int(Control::active_value(Control::max_allowed_parallelism));
+    if (all <= 1) return;
+    // So many parts, each of which waits for the others, that all threads take one. A busy machine may be slow to start
+    // them: then the rest is started when it is needed.
+    constexpr auto kLongest = std::chrono::milliseconds(100);
+    const auto end = std::chrono::steady_clock::now() + kLongest;
+    std::atomic<int> arrived = 0;
+    tbb::task_arena(all).execute([&] {
+        tbb::parallel_for(
+            0, all,
+            [&](int) {
+                ++arrived;
+                while (arrived < all && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+            },
+            tbb::simple_partitioner());
+    });
 }
 
 }  // namespace nephos

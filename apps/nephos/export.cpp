@@ -149,7 +149,7 @@ void print_plan(const ExportOptions& options, const ExportReport& report, bool p
 }
 
 int run_command(const ExportArguments& a) {
-    limit_threads(a.work.threads);
+    start_threads(a.work.threads);
     const ExportOptions options = options_of(a);
     ExportReport report;
     bool stopped = false;

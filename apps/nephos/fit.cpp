@@ -26,7 +26,7 @@ struct FitArguments {
 };
 
 int fit(const FitArguments& a) {
-    limit_threads(1);  // workers are forked from one thread
+    start_threads(1);  // workers are forked from one thread
     const FitOptions options = read_fit_file(a.file, a.runs);
     if (!a.work.quiet)
         for (const std::string& note : options.notes) print_note(note);

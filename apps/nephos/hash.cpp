@@ -62,7 +62,7 @@ std::vector<std::string> expected_lines(const std::string& path) {
 }
 
 int hash(const HashArguments& a) {
-    limit_threads(a.work.threads);
+    start_threads(a.work.threads);
     const Scene scene = load_scene(a.scene, SceneUse::without_frames);
     std::vector<std::string> expected;
     if (!a.check.empty()) expected = expected_lines(a.check);

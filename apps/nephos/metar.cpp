@@ -160,7 +160,7 @@ int metar(const MetarArguments& a) {
         taf ? explain(a, *taf) : explain(a, report);
         return 0;
     }
-    limit_threads(a.work.threads);
+    start_threads(a.work.threads);
     const FittedScene fitted = taf ? fit_taf(*taf, a.options) : fit_metar(report, a.options);
     Scene scene = read_scene_text(fitted.text, "the scene of the report");
     Output output;

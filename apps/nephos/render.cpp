@@ -180,7 +180,7 @@ void report(const RenderArguments& a, const LoadedDensity& loaded, const VolumeP
 
 int render(const RenderArguments& a) {
     check_outputs(a);
-    limit_threads(a.work.threads);
+    start_threads(a.work.threads);
     std::optional<Scene> scene;
     if (!a.scene.file.empty()) scene = load_scene(a.scene);
     for (const std::string& out : a.out) {

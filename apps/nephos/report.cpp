@@ -45,7 +45,7 @@ void require_none_of_sweep(const std::filesystem::path& folder, const std::files
 }
 
 int report(const ReportArguments& a) {
-    limit_threads(1);
+    start_threads(1);
     const SweepPlan plan = plan_of_folder(a.folders.front());
     const Records records =
         records_of_folders(plan, std::vector<std::filesystem::path>(a.folders.begin(), a.folders.end()));

@@ -240,7 +240,7 @@ int run(const RunArguments& a) {
         print_needs(a);
         return 0;
     }
-    limit_threads(a.work.threads);
+    start_threads(a.work.threads);
     RunSettings settings = settings_of(a);
     const bool wants_frames = settings.scene.frames.enabled && !a.statistics_only;
     const int frames_of_scene = settings.scene.frames.count;

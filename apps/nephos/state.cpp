@@ -57,7 +57,7 @@ std::size_t chosen_layer(const StateArguments& a, const std::vector<LayerSimulat
 }
 
 int state(const StateArguments& a) {
-    limit_threads(a.work.threads);
+    start_threads(a.work.threads);
     const Scene scene = load_scene(a.scene, SceneUse::without_frames);
     refuse_to_replace(a.scene.file, a.out);
     refuse_to_replace(a.from, a.out);

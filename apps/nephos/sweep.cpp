@@ -196,7 +196,7 @@ void write_and_print_tables(const SweepPlan& plan, const Records& records, const
 }
 
 int sweep(const SweepArguments& a) {
-    limit_threads(1);  // parallelism is between runs; and workers are forked from one thread
+    start_threads(1);  // parallelism is between runs; and workers are forked from one thread
     const SweepPlan plan(options_of(a));
     SweepJob job;
     job.folder = a.out.empty() ? "out/sweep-" + std::filesystem::path(a.scene.file).stem().string() : a.out;
@@ -313,7 +313,7 @@ std::unique_ptr<FolderGuard> guard_of_tables(const std::filesystem::path& folder
 }
 
 int merge(const MergeArguments& a) {
-    limit_threads(1);
+    start_threads(1);
     const std::string out = a.out.empty() ? a.folders.front() : a.out;
     const std::unique_ptr<FolderGuard> guard = guard_of_tables(out);
     const SweepPlan plan = plan_of_folder(a.folders.front());

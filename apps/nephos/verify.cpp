@@ -63,7 +63,7 @@ void print(const VerifyArguments& a, const Verification& result) {
 int verify(const VerifyArguments& a) {
     if (a.options.hashes_only && (a.options.seam || a.options.max_change))
         throw Error(ErrorCode::usage, "--hashes decodes nothing: leave it out, or --seam and --max-change");
-    limit_threads(a.work.threads);
+    start_threads(a.work.threads);
     const Verification result = verify_folder(a);
     print(a, result);
     if (result.passed()) return 0;

@@ -10,7 +10,6 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 #include <fcntl.h>
@@ -19,6 +18,7 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/memory.h"
 #include "density/export/nanovdb_library.h"
 #include "density/export/nanovdb_stream.h"
 #include "density/openvdb_access.h"
@@ -91,9 +91,8 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
     const nanovdb::GridHandle<> handle = [&] {
         try {
             return converted(*described(density), quantise);
-        } catch (const std::system_error&) {  // of a thread that cannot start for want of addresses
-            throw std::bad_alloc();
         } catch (const std::exception& error) {
+            if (is_lack_of_threads(error)) throw;
             if (is_of_memory(error)) throw std::bad_alloc();
             throw Error(ErrorCode::io, path.string() + ": cannot convert to NanoVDB: " + error.what());
         }

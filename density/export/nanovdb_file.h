@@ -22,8 +22,8 @@ constexpr int bits_of(NanoQuantise quantise) {
     return quantise == NanoQuantise::none ? 32 : quantise == NanoQuantise::fp16 ? 16 : 8;
 }
 
-// Writes atomically. Throws Error(io) naming the file, std::bad_alloc where the library, zlib or a thread has no memory. Thread-safe
-// for different files.
+// Writes atomically. Throws Error(io) naming the file, std::bad_alloc where the library or zlib has no memory, and what it meets where
+// no thread can be started (core/memory.h is_lack_of_threads()). Thread-safe for different files.
 void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
                    NanoQuantise quantise);
 

@@ -109,6 +109,28 @@ class Start(Case):
             self.assertNotIn("unexpected", result.stderr)
         self.assertEqual(statuses, {0, 3})
 
+    @unittest.skipIf(os.geteuid() != 0, "needs another user")
+    def test_threads_are_there_from_the_start_or_not_at_all(self):
+        """Whether a command has enough of them is no matter of chance: oneTBB would wait for ever for what comes too late."""
+        self.call("run", self.scene, "--no-render", "--out", "run")
+        os.chmod(self.folder, 0o777)
+        user = 41235  # who has no other process
+        def drop(most):
+            os.setgroups([])
+            os.setgid(user)
+            os.setuid(user)
+            resource.setrlimit(resource.RLIMIT_NPROC, (most, most))
+        for most, expected in ((1, {3}), (7, {3}), (8, {3}), (9, {3}), (14, {0, 3}), (60, {0})):
+            results = set()
+            for _ in range(3):
+                shutil.rmtree(self.folder / "volumes", ignore_errors=True)
+                result = subprocess.run([NEPHOS, "export", "run", "--to", "nvdb", "--to", "vdb", "--velocity", "v", "-o", "volumes", "-q", "-j", "8"],
+                                        cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=PATIENCE,
+                                        preexec_fn=lambda most=most: drop(most))
+                results.add(result.returncode)
+                self.assertNotIn("memory", result.stderr)
+            self.assertLessEqual(results, expected, most)
+
     def test_a_library_without_the_functions_is_another_version(self):
         program, place = self.copied_program()
         source = self.write("empty.c", "int nephos_nothing;\n")
