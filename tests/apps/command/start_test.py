@@ -14,6 +14,14 @@ from case import NEPHOS, PATIENCE, Case
 SLOW = ("libopenvdb", "libOpenEXR", "libblosc", "libboost_iostreams", "liblog4cplus")
 
 
+def become(user, processes):
+    """Makes this process one of a user who has no other, and may have so many."""
+    os.setgroups([])
+    os.setgid(user)
+    os.setuid(user)
+    resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
+
+
 class Start(Case):
     def loaded(self, *arguments, status=0):
         """The slow libraries that a command loads, from the report of the dynamic linker."""
@@ -92,17 +100,11 @@ class Start(Case):
     def test_without_threads_nothing_aborts(self):
         """Limits of a user's processes, from those of the program alone to all that it wants."""
         os.chmod(self.folder, 0o777)
-        user = 41234  # who has no other process
-        def drop(most):
-            os.setgroups([])
-            os.setgid(user)
-            os.setuid(user)
-            resource.setrlimit(resource.RLIMIT_NPROC, (most, most))
         statuses = set()
         for most in range(1, 20):
             shutil.rmtree(self.folder / "limited", ignore_errors=True)
             result = subprocess.run([NEPHOS, "run", self.scene, "--out", "limited", "-q", "--splatting", "cpu", "-j", str(1 + most % 3)], cwd=self.folder,
-                                    env=self.environment, capture_output=True, text=True, timeout=PATIENCE, preexec_fn=lambda most=most: drop(most))
+                                    env=self.environment, capture_output=True, text=True, timeout=PATIENCE, preexec_fn=lambda most=most: become(41234, most))
             statuses.add(result.returncode)
             self.assertIn(result.returncode, (0, 3), result.stderr)
             self.assertEqual(result.returncode == 0, result.stderr == "")
@@ -114,19 +116,13 @@ class Start(Case):
         """Whether a command has enough of them is no matter of chance: oneTBB would wait for ever for what comes too late."""
         self.call("run", self.scene, "--no-render", "--out", "run")
         os.chmod(self.folder, 0o777)
-        user = 41235  # who has no other process
-        def drop(most):
-            os.setgroups([])
-            os.setgid(user)
-            os.setuid(user)
-            resource.setrlimit(resource.RLIMIT_NPROC, (most, most))
         for most, expected in ((1, {3}), (7, {3}), (8, {3}), (9, {3}), (14, {0, 3}), (60, {0})):
             results = set()
             for _ in range(3):
                 shutil.rmtree(self.folder / "volumes", ignore_errors=True)
                 result = subprocess.run([NEPHOS, "export", "run", "--to", "nvdb", "--to", "vdb", "--velocity", "v", "-o", "volumes", "-q", "-j", "8"],
                                         cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=PATIENCE,
-                                        preexec_fn=lambda most=most: drop(most))
+                                        preexec_fn=lambda most=most: become(41235, most))
                 results.add(result.returncode)
                 self.assertNotIn("memory", result.stderr)
             self.assertLessEqual(results, expected, most)
