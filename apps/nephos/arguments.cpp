@@ -12,9 +12,9 @@
 #include "study/folder_contents.h"
 #include <fmt/format.h>
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/partitioner.h>
+#include <tbb/info.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 
 #include "apps/nephos/terminal.h"
 #include "core/atomic_file.h"
@@ -249,21 +249,24 @@ void start_threads(int threads) {
         [[maybe_unused]] static const Control* volatile limit = nullptr;
         limit = new Control(Control::max_allowed_parallelism, std::size_t(threads));
     }
-    const int all = int(Control::active_value(Control::max_allowed_parallelism));
+    const int all = std::min(int(Control::active_value(Control::max_allowed_parallelism)),
+                             tbb::info::default_concurrency());
     if (all <= 1) return;
     // So many parts, each of which waits for the others, that all threads take one. A busy machine may be slow to start
     // them: then the rest is started when it is needed.
     constexpr auto kLongest = std::chrono::milliseconds(100);
     const auto end = std::chrono::steady_clock::now() + kLongest;
     std::atomic<int> arrived = 0;
-    tbb::task_arena(all).execute([&] {
-        tbb::parallel_for(
-            0, all,
-            [&](int) {
-                ++arrived;
-                while (arrived < all && std::chrono::steady_clock::now() < end) std::this_thread::yield();
-            },
-            tbb::simple_partitioner());
+    const auto part = [&] {
+        ++arrived;
+        while (arrived < all && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    };
+    tbb::task_arena arena(all);
+    arena.execute([&]() noexcept {  // what is thrown ends the program (program.cpp)
+        tbb::task_group group;
+        for (int n = 1; n < all; ++n) group.run(part);
+        part();
+        group.wait();
     });
 }
 

@@ -92,10 +92,11 @@ void print_scene_errors(const SceneErrors& errors);
 // Prints what a scene may not mean (scenes/format/warnings.h) on standard error.
 void print_warnings(const Scene& scene);
 
-// Starts the threads of oneTBB, and limits their number until the program ends; 0 = as many as there are processors. Not for a
-// part of it: an object that took the limit back would start threads in its destructor. And not when they are needed: where the
-// system has none any more, oneTBB throws, and the next of its functions waits for ever, as it may in the destructor of a volume
-// (2021.8: the epoch of market::adjust_demand() stays behind). What is thrown here is told before there is anything to free.
+// Limits the threads of oneTBB until the program ends; 0 = as many as there are processors. Not for a part of it: an object that took
+// the limit back would start threads in its destructor. And starts them, those that there are processors for, as oneTBB would
+// throw where the system has none any more when they are needed, and wait for ever in its next function, as in the destructor of
+// a volume (2021.8: the epoch of market::adjust_demand() stays behind). Where one cannot be started the program ends
+// here, status 3, before there is anything to free.
 void start_threads(int threads);
 
 }  // namespace nephos
