@@ -67,8 +67,8 @@ std::vector<Check> check_files(const std::filesystem::path& folder, const std::v
 // Error(io) as open_regular_file().
 Check check_list(const std::filesystem::path& list);
 
-// How density goes from each plane of voxels along an axis to the next: entry n from plane n to plane n + 1, the last one from
-// the last plane to the first, where the volume would meet its own repetition. Means over the voxels of a plane.
+// Measures how density changes from each plane of voxels along an axis to the next: entry n from plane n to plane n + 1, the last
+// one from the last plane to the first, where the volume would meet its own repetition. Means over the voxels of a plane.
 struct PlaneSteps {
     std::vector<double> steps;  // the absolute difference
     // The part of each that is no continuation of its row: what it has above 1.5 times the larger of the steps before and behind

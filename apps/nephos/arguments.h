@@ -92,11 +92,10 @@ void print_scene_errors(const SceneErrors& errors);
 // Prints what a scene may not mean (scenes/format/warnings.h) on standard error.
 void print_warnings(const Scene& scene);
 
-// Limits the threads of oneTBB until the program ends; 0 = as many as there are processors. Not for a part of it: an object that took
-// the limit back would start threads in its destructor. And starts them, those that there are processors for, as oneTBB would
-// throw where the system has none any more when they are needed, and wait for ever in its next function, as in the destructor of
-// a volume (2021.8: the epoch of market::adjust_demand() stays behind). Where one cannot be started the program ends
-// here, status 3, before there is anything to free.
+// Limits the threads of oneTBB until the program ends (0 = as many as there are processors), and starts those that there are
+// processors for; 1 starts none. Where one cannot be started the program ends here, status 3, before there is anything to free.
+// Later oneTBB would throw, and its next function, as in the destructor of a volume, could wait for ever (2021.8: the epoch of
+// market::adjust_demand() stays behind). The limit is never taken back, as that would start threads at the program's end.
 void start_threads(int threads);
 
 }  // namespace nephos

@@ -155,7 +155,7 @@ TEST(Sandbox, StartsAnewWhereNothingComes) {
     EXPECT_EQ(told, 1);
 }
 
-// That this process has no thread left for what it does with a file is no fault of the file.
+// Checks that a thread which this process cannot start, while it takes what was read, is not told as a fault of the file.
 TEST(Sandbox, LackOfThreadsIsNotToldOfTheFile) {
     for (const bool of_tbb : {false, true}) {
         const auto without_thread = [&](SandboxReader&) {

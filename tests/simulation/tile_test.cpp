@@ -167,7 +167,7 @@ TEST(Seam, WhatGoesOnIsNoBreak) {
     }
 }
 
-// Where every other step is a break, one more of them is none; one that is larger is.
+// Checks that one more break is no seam where every other step is a break, and that a larger one is.
 TEST(Seam, BreaksEverywhereHideNoLargerOne) {
     EXPECT_FALSE(seam_of(plane_steps({0, 0, 2, 2, 0, 0, 2, 2}, 8, 1, 1, 0)).shows());
     const Seam seam = seam_of(plane_steps({0, 0, 2, 2, 4, 4, 6, 6}, 8, 1, 1, 0));
@@ -175,7 +175,7 @@ TEST(Seam, BreaksEverywhereHideNoLargerOne) {
     EXPECT_EQ(seam.limit, 3);
 }
 
-// Of a box of one to three planes nothing can be said: whatever is in it, no seam shows.
+// Checks that no seam shows in a box of one to three planes, whatever is in it: nothing can be said of so few.
 TEST(Seam, ThreePlanesHaveNone) {
     for (const std::vector<float>& row :
          {std::vector<float>{0.5f}, {0, 1}, {0.5f, 0.25f}, {0, 0.5f, 1}, {0, 0, 1}})
