@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The memory that this process may still allocate, queried before a large allocation, the memory that it
-// retains, and how it tells that there is no room for a thread.
+// The memory that this process may still allocate, queried before a large allocation, and the memory that it
+// retains.
 
 #include <cstddef>
-#include <exception>
 #include <filesystem>
 #include <string>
 
@@ -29,9 +28,5 @@ AvailableMemory available_memory(const std::filesystem::path& root = "/");
 // malloc for the whole process. Call it before any other function. Does nothing where malloc is not that of
 // the GNU C library.
 void keep_freed_memory();
-
-// Returns whether an exception, of the standard library or of TBB, says that this process could not start another
-// thread, whatever that was for.
-bool is_lack_of_threads(const std::exception& error);
 
 }  // namespace nephos

@@ -185,7 +185,8 @@ DeviceOptions device_options(const DeviceArguments& arguments, const FrameOption
 
 void add_threads(CLI::App& command, WorkArguments& arguments) {
     add_value(command, "-j,--threads", "N",
-              "Threads to use; the results are the same whatever it is (default: all cores)",
+              "Threads to use, no more than there are cores; the results are the same whatever it is "
+              "(default: all cores)",
               [&](const std::string& text) { arguments.threads = int(parse_integer(text, 1, kMaxThreads)); });
 }
 
@@ -244,13 +245,11 @@ void print_warnings(const Scene& scene) {
 
 void start_threads(int threads) {
     using Control = tbb::global_control;
-    if (threads > 0) {
-        // Never deleted; volatile, else the compiler leaves the pointer out, and the sanitizer finds a leak.
-        [[maybe_unused]] static const Control* volatile limit = nullptr;
-        limit = new Control(Control::max_allowed_parallelism, std::size_t(threads));
-    }
-    const int all = std::min(int(Control::active_value(Control::max_allowed_parallelism)),
-                             tbb::info::default_concurrency());
+    const int processors = tbb::info::default_concurrency();
+    const int all = threads > 0 ? std::min(threads, processors) : processors;
+    // Never deleted; volatile, else the compiler leaves the pointer out, and the sanitizer finds a leak.
+    [[maybe_unused]] static const Control* volatile limit = nullptr;
+    limit = new Control(Control::max_allowed_parallelism, std::size_t(all));
     if (all <= 1) return;
     // So many parts, each of which waits for the others, that all threads take one. A busy machine may be slow to start
     // them: then the rest is started when it is needed.

@@ -92,8 +92,8 @@ void print_scene_errors(const SceneErrors& errors);
 // Prints what a scene may not mean (scenes/format/warnings.h) on standard error.
 void print_warnings(const Scene& scene);
 
-// Limits the threads of oneTBB until the program ends (0 = as many as there are processors), and starts those that there are
-// processors for; 1 starts none. Where one cannot be started the program ends here, status 3, before there is anything to free.
+// Limits the threads of oneTBB until the program ends, to the number of processors where that is less (or 0 is given), and starts
+// them; 1 starts none. Where one cannot be started the program ends here, status 3, before there is anything to free.
 // Later oneTBB would throw, and its next function, as in the destructor of a volume, could wait for ever (2021.8: the epoch of
 // market::adjust_demand() stays behind). The limit is never taken back, as that would start threads at the program's end.
 void start_threads(int threads);

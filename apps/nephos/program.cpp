@@ -7,6 +7,7 @@
 //     SIGTERM
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
@@ -24,6 +25,7 @@
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
 #include "core/memory.h"
+#include "core/threads.h"
 #include "scenes/format/errors.h"
 
 namespace nephos {
@@ -176,7 +178,8 @@ pid_t program = 0;
 std::terminate_handler ends_otherwise = nullptr;
 
 // Tells a lack of memory or of threads, which libraries meet where no exception may leave them, in place of an abort: files are
-// whole or absent then, as after a signal. All else, and children of the program, end as they would.
+// whole or absent then, as after a signal. Threads that end at once tell it once. All else, and children of the program, end as
+// they would.
 [[noreturn]] void end_and_tell() {
     std::string_view told;
     try {
@@ -188,6 +191,8 @@ std::terminate_handler ends_otherwise = nullptr;
     } catch (...) {
     }
     if (!told.empty() && ::getpid() == program) {
+        static std::atomic_flag is_told;
+        while (is_told.test_and_set()) ::pause();  // until the first of them has ended the program
         for (const std::string_view part : {std::string_view("error: "), told, std::string_view("\n")})
             [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, part.data(), part.size());
         ::_exit(kIo);

@@ -18,7 +18,7 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "core/memory.h"
+#include "core/threads.h"
 #include "density/export/nanovdb_library.h"
 #include "density/export/nanovdb_stream.h"
 #include "density/openvdb_access.h"

@@ -23,7 +23,7 @@ constexpr int bits_of(NanoQuantise quantise) {
 }
 
 // Writes atomically. Throws Error(io) naming the file, std::bad_alloc where the library or zlib has no memory, and what it meets where
-// no thread can be started (core/memory.h is_lack_of_threads()). Thread-safe for different files.
+// no thread can be started (core/threads.h is_lack_of_threads()). Thread-safe for different files.
 void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
                    NanoQuantise quantise);
 

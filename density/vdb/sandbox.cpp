@@ -21,8 +21,8 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "core/memory.h"
 #include "core/text.h"
+#include "core/threads.h"
 #include "density/vdb/confinement.h"
 #include "density/vdb/sanitized.h"
 

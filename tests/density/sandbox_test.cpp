@@ -31,7 +31,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "core/memory.h"
+#include "core/threads.h"
 #include "density/vdb/sanitized.h"
 
 namespace nephos {

@@ -32,7 +32,7 @@ NOTICED = {"asan": {**ADDRESS, **UNDEFINED, **CAST},
 IN_CHILD = {"asan": ("heap-overflow", "signed-overflow"), "fuzz": ("heap-overflow", "signed-overflow"), "ubsan": ("signed-overflow",),
             "tsan": ("race",)}
 ENDED = "a sanitizer has ended the process that reads a file"
-CHILD = ["density/vdb/sandbox.cpp", "density/vdb/confinement.cpp", "core/text.cpp", "core/descriptor.cpp"]
+CHILD = ["density/vdb/sandbox.cpp", "density/vdb/confinement.cpp", "core/text.cpp", "core/descriptor.cpp", "core/threads.cpp"]
 MEMCHECK = {"heap-overflow": "Invalid read of size 1", "use-after-free": "Invalid read of size 1",
             "uninitialised": "depends on uninitialised value", "leak": "definitely lost"}
 VALGRIND = ["valgrind", "--quiet", "--error-exitcode=99", "--leak-check=full", "--errors-for-leak-kinds=definite",
