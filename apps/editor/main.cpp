@@ -6,11 +6,13 @@
 #include <vector>
 
 #include "apps/editor/editor.h"
+#include "apps/nephos/arguments.h"
 #include "apps/nephos/commands.h"
 
 namespace {
 
 int edit(const nephos::EditArguments& a) {
+    nephos::start_threads(0);
     nephos::EditorOptions options;
     options.scene = a.scene;
     options.screenshot = a.screenshot;
