@@ -2,12 +2,12 @@
 #include "apps/nephos/arguments.h"
 
 #include <algorithm>
-#include <atomic>
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <limits>
-#include <thread>
+#include <mutex>
 
 #include "study/folder_contents.h"
 #include <fmt/format.h>
@@ -251,14 +251,17 @@ void start_threads(int threads) {
     [[maybe_unused]] static const Control* volatile limit = nullptr;
     limit = new Control(Control::max_allowed_parallelism, std::size_t(all));
     if (all <= 1) return;
-    // So many parts, each of which waits for the others, that all threads take one. A busy machine may be slow to start
-    // them: then the rest is started when it is needed.
-    constexpr auto kLongest = std::chrono::milliseconds(100);
+    // So many parts, each of which waits for the others, that all threads take one. They sleep, as a machine that is slow to start
+    // them needs its time for that; should oneTBB keep one back, it is started when it is needed.
+    constexpr auto kLongest = std::chrono::seconds(10);
     const auto end = std::chrono::steady_clock::now() + kLongest;
-    std::atomic<int> arrived = 0;
+    std::mutex mutex;
+    std::condition_variable all_are_there;
+    int arrived = 0;
     const auto part = [&] {
-        ++arrived;
-        while (arrived < all && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+        std::unique_lock lock(mutex);
+        if (++arrived == all) all_are_there.notify_all();
+        all_are_there.wait_until(lock, end, [&] { return arrived == all; });
     };
     tbb::task_arena arena(all);
     arena.execute([&]() noexcept {  // what is thrown ends the program (program.cpp)

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 #include <sys/types.h>
 #include <unistd.h>
 
@@ -147,15 +148,21 @@ constexpr std::string_view kNoThread =
     "cannot start another thread: expected a higher limit of processes or addresses (`ulimit -a`), or fewer "
     "threads (-j 1)";
 
-// The only place where exceptions end.
-int guarded(int argc, const char* const* argv, const EditFunction& edit) {
-    CLI::App app;
+// Returns whether this thread may tell why the program ends: one of several that end it at once does, and the others wait, as long
+// as that may take.
+bool may_tell() {
+    static std::atomic_flag is_told;
+    for (int tenths_s = 0; is_told.test_and_set(); ++tenths_s) {
+        if (tenths_s == 50) return false;
+        ::usleep(100'000);
+    }
+    return true;
+}
+
+// Tells the exception that is being handled, and returns the exit status for it.
+int report_exception() {
     try {
-        const int status = run_command(app, argc, argv, edit);
-        Output().flush();
-        return status;
-    } catch (const OutputClosed&) {
-        return 0;
+        throw;
     } catch (const SceneErrors& error) {
         print_scene_errors(error);
         return int(error.code());
@@ -171,6 +178,21 @@ int guarded(int argc, const char* const* argv, const EditFunction& edit) {
         print_error(is_lack_of_threads(error) ? std::string(kNoThread)
                                               : std::string("unexpected: ") + error.what());
         return kIo;
+    }
+}
+
+// The only place where exceptions end.
+int guarded(int argc, const char* const* argv, const EditFunction& edit) {
+    CLI::App app;
+    try {
+        const int status = run_command(app, argc, argv, edit);
+        Output().flush();
+        return status;
+    } catch (const OutputClosed&) {
+        return 0;
+    } catch (const std::exception&) {
+        may_tell();  // or another thread has ended the program
+        return report_exception();
     }
 }
 
@@ -191,10 +213,11 @@ std::terminate_handler ends_otherwise = nullptr;
     } catch (...) {
     }
     if (!told.empty() && ::getpid() == program) {
-        static std::atomic_flag is_told;
-        while (is_told.test_and_set()) ::pause();  // until the first of them has ended the program
-        for (const std::string_view part : {std::string_view("error: "), told, std::string_view("\n")})
-            [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, part.data(), part.size());
+        if (may_tell()) {
+            char line[256];  // in one piece, and without memory
+            const auto end = fmt::format_to_n(line, sizeof line, "error: {}\n", told).out;
+            [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, line, std::size_t(end - line));
+        }
         ::_exit(kIo);
     }
     ends_otherwise();

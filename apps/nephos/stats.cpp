@@ -107,6 +107,7 @@ void print_table(const CloudMasks& masks, const MaskStatistics& found) {
 }
 
 int stats(const StatsArguments& a) {
+    start_threads(1);  // one suffices, and where processes are limited another could fail
     const CloudMasks masks =
         read_masks(std::vector<std::filesystem::path>(a.files.begin(), a.files.end()), a.mask);
     for (const std::string& note : masks.notes) print_note(note);
