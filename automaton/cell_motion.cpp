@@ -101,9 +101,10 @@ std::vector<CellMotion::Moving> CellMotion::moved(const Lattice& lattice, const 
                 bool inside = true;
                 for (int axis = 0; axis < 3; ++axis) {
                     if (!(std::abs(cells[axis]) <= kMaxExtent)) {
-                        throw Error(ErrorCode::usage, "the wind moves cells by " + number_text(cells[axis], 6) +
-                                                          " cells in one step; at most " +
-                                                          std::to_string(kMaxExtent) + " are possible in a field");
+                        throw Error(ErrorCode::usage,
+                                    "the wind of `wind_field` moves cells by " + number_text(cells[axis], 6) +
+                                        " cells in one step: expected at most " + std::to_string(kMaxExtent) +
+                                        ", by less wind, a shorter `time.step_s` or larger cells");
                     }
                     std::int64_t& to = at[std::size_t(axis)];
                     to += std::llround(cells[axis] * kCell);

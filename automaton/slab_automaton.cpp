@@ -142,7 +142,8 @@ void SlabAutomaton::Impl::grow_and_draw() {
 SlabAutomaton::SlabAutomaton(const AutomatonOptions& options, int first, int end) {
     check(options);
     if (!is_profile(options.wind.fields))
-        throw Error(ErrorCode::usage, "a wind field moves cells from level to level: expected one process for the lattice");
+        throw Error(ErrorCode::usage,
+                    "the wind differs from place to place: expected one that is the same all over a level");
     if (first < 0 || end > options.extent.z || first >= end || first % kBlockEdge != 0 ||
         (end % kBlockEdge != 0 && end != options.extent.z))
         throw Error(ErrorCode::usage, "a slab of levels " + std::to_string(first) + " to " +

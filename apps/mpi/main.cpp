@@ -29,6 +29,7 @@
 #include "apps/nephos/man_page.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "core/wind_field.h"
 #include "density/vdb/vdb_file.h"
 #include "scenes/format/reader.h"
 #include "simulation/layer_simulation.h"
@@ -74,6 +75,12 @@ void simulate(const Arguments& a) {
     if (!scene.layers.empty() || scene.initial_state_file)
         throw Error(ErrorCode::usage,
                     a.scene + ": one lattice without layers and without initial_state is expected");
+    if (!is_profile(scene.automaton.wind.fields))
+        throw Error(
+            ErrorCode::usage,
+            a.scene +
+                ": has a `wind_field` that differs from place to place: expected a wind that is the same all "
+                "over a level, or `nephos run` or `nephos hash`, which step all of a lattice in one process");
     AutomatonOptions options = scene.automaton;
     if (a.seed) options.seed = *a.seed;
     Ranks ranks(options);
@@ -119,7 +126,10 @@ void add_options(CLI::App& app, Arguments& a) {
     app.set_help_flag("-h,--help", "This page")->group("General");
     app.set_version_flag("-V,--version", fmt::format("nephos {}", version()), "Version of nephos")
         ->group("General");
-    app.add_option("SCENE", a.scene, "Scene of one lattice, without layers")->required();
+    app.add_option(
+           "SCENE", a.scene,
+           "Scene of one lattice, without layers, `initial_state` and winds that differ within a level")
+        ->required();
     app.add_option("--set", a.settings, "Change a key of the scene; may be repeated")
         ->type_name("KEY=VALUE")
         ->expected(1)
