@@ -27,8 +27,7 @@ void check_root(const std::string& where, const Root& root) {
 void check_seed(const std::string& where, const Seed& seed) {
     for (auto [name, value] :
          {std::pair{"width", seed.size_m.x}, {"depth", seed.size_m.y}, {"height", seed.size_m.z}}) {
-        require_positive(where + ": " + name + " (m)", value);
-        require_in(where + ": " + name + " (m)", value, 0, kMaxLength);
+        require_in(where + ": " + name + " (m)", value, kSmallestSize_m, kMaxLength);
     }
     for (double value : {seed.position_m.x, seed.position_m.y, seed.position_m.z}) {
         require_in(where + ": position (m)", value, -kMaxLength, kMaxLength);
@@ -36,8 +35,7 @@ void check_seed(const std::string& where, const Seed& seed) {
     require_range(where + ": billboards", seed.billboards.min, seed.billboards.max, 0, kMaxCount);
     for (auto [name, size] : {std::pair{"billboard width (m)", seed.billboard_width_m},
                               {"billboard height (m)", seed.billboard_height_m}}) {
-        require_range(where + ": " + name, size.min, size.max, 0, kMaxLength);
-        require_positive(where + ": " + name + ": the minimum", size.min);
+        require_range(where + ": " + name, size.min, size.max, kSmallestSize_m, kLargestBillboard_m);
     }
     require_in(where + ": strength", seed.strength, 0, 1);
     for (std::size_t r = 0; r < seed.roots.size(); ++r)

@@ -54,13 +54,16 @@ struct Root {
     bool operator==(const Root&) const = default;
 };
 
+inline constexpr double kSmallestSize_m = 0.001,
+                        kLargestBillboard_m = 60'000;  // which can be drawn (render/cloud/splats.h)
+
 // A box that the artist placed.
 struct Seed {
     Vec3 position_m{};                 // of the box's centre, model space
-    Vec3 size_m{100, 100, 100};        // width (x), depth (y), height (z), each > 0
+    Vec3 size_m{100, 100, 100};        // width (x), depth (y), height (z), each from kSmallestSize_m
     CountRange billboards{1, 1};       // scattered in each box of this seed, 0..10000
-    Range billboard_width_m{30, 50};   // > 0
-    Range billboard_height_m{30, 50};  // > 0
+    Range billboard_width_m{30, 50};   // kSmallestSize_m to kLargestBillboard_m
+    Range billboard_height_m{30, 50};  // likewise
     BillboardTexture texture = BillboardTexture::soft;
     double strength = 1;  // effect on the probability field, 0..1
     std::vector<Root> roots;

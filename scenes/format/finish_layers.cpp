@@ -258,6 +258,13 @@ void check_simulation(const SectionReader& reader, const Scene& scene, std::size
         }
         return;
     }
+    if (options.automaton) {
+        const std::size_t before = reader.document.problems.size();
+        check_reach_of_ellipsoids(
+            reader, options.ellipsoids, options.scatters,
+            largest_reach_m(options.extent, options.placement.cell_size_m, options.boundaries));
+        if (reader.document.problems.size() > before) return;
+    }
     try {
         if (options.automaton) check(automaton_options(scene, layer));
         const SkySimulation sky(sky_options(scene, layer));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -55,21 +56,8 @@ void check_wind_speed(const SectionReader& reader, const Scene& scene) {
 void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
     if (!reader.sound({"lattice", "field"})) return;
     const AutomatonOptions& o = scene.automaton;
-    const Vec3 largest = largest_reach_m(o.extent, o.placement.cell_size_m, o.boundaries);
-    const auto check_items = [&](const char* name, const auto& check_item) {
-        const SectionReader field = reader.below("field");
-        const Entry* items = field.find(name);
-        for (std::size_t n = 0; items != nullptr && n < items->value.items.size(); ++n) check_item(n, field.item(name, n));
-    };
-    check_items("ellipsoids", [&](std::size_t n, const SectionReader& item) {
-        check_periodic_reach(item, {}, largest, reach_m(o.field.ellipsoids[n]), "semi_axes_m", "semi_axes_m");
-    });
-    check_items("scatters", [&](std::size_t n, const SectionReader& item) {
-        const EllipsoidScatter& s = o.field.scatters[n];
-        const bool longer = s.semi_axis_x_m.max >= s.semi_axis_y_m.max;
-        const char* const horizontal = longer ? "semi_axis_x_m" : "semi_axis_y_m";
-        check_periodic_reach(item, {}, largest, reach_m(s), horizontal, "semi_axis_z_m");
-    });
+    check_reach_of_ellipsoids(reader.below("field"), o.field.ellipsoids, o.field.scatters,
+                              largest_reach_m(o.extent, o.placement.cell_size_m, o.boundaries));
 }
 
 void check_frames(const SectionReader& reader, const Scene& scene) {
@@ -138,6 +126,24 @@ void check_periodic_reach(const SectionReader& reader, const std::string& what, 
     const bool across = exceeds(0) || exceeds(1);
     if (across) report(horizontal, exceeds(0) ? 0 : 1);
     if (exceeds(2) && (vertical != horizontal || !across)) report(vertical, 2);
+}
+
+void check_reach_of_ellipsoids(const SectionReader& owner, std::span<const Ellipsoid> ellipsoids,
+                               std::span<const EllipsoidScatter> scatters, const Vec3& largest_m) {
+    const auto check_items = [&](const char* name, const auto& check_item) {
+        const Entry* items = owner.find(name);
+        for (std::size_t n = 0; items != nullptr && n < items->value.items.size(); ++n)
+            check_item(n, owner.item(name, n));
+    };
+    check_items("ellipsoids", [&](std::size_t n, const SectionReader& item) {
+        check_periodic_reach(item, {}, largest_m, reach_m(ellipsoids[n]), "semi_axes_m", "semi_axes_m");
+    });
+    check_items("scatters", [&](std::size_t n, const SectionReader& item) {
+        const EllipsoidScatter& s = scatters[n];
+        const bool longer = s.semi_axis_x_m.max >= s.semi_axis_y_m.max;
+        const char* const horizontal = longer ? "semi_axis_x_m" : "semi_axis_y_m";
+        check_periodic_reach(item, {}, largest_m, reach_m(s), horizontal, "semi_axis_z_m");
+    });
 }
 
 void check_wind_times(const SectionReader& owner, const Wind& wind) {

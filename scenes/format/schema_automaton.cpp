@@ -91,10 +91,10 @@ const Section& thermals_section() {
         "scatter's `life_s` is the plume's. With its centre on the bottom of the lattice, the condensation "
         "level, the "
         "base is flat: nothing is born below it.",
-        {required(key<&ThermalPlume::interval_s>("interval_s", "s", above(0, kLongest_s),
+        {required(key<&ThermalPlume::interval_s>("interval_s", "s", between(0.001, kLongest_s),
                                                  "Time from one release to the next.", kBubbles)),
          key<&ThermalPlume::life_s>(
-             "life_s", "s", above(0, kLongest_s),
+             "life_s", "s", between(0.001, kLongest_s),
              "Life of a thermal; at most the shortest of the plume. The last one dies with it."),
          key<&ThermalPlume::rise_m>(
              "rise_m", "m", between(0, kFarthestPlace_m),

@@ -83,6 +83,10 @@ void check_camera_path(const SectionReader& reader, const Camera& camera);
 void check_periodic_reach(const SectionReader& reader, const std::string& what, const Vec3& largest_m,
                           const Vec3& reach_m, std::string_view horizontal, std::string_view vertical);
 
+// The same for the tables `ellipsoids` and `scatters` of [field] or of a layer.
+void check_reach_of_ellipsoids(const SectionReader& owner, std::span<const Ellipsoid> ellipsoids,
+                               std::span<const EllipsoidScatter> scatters, const Vec3& largest_m);
+
 // Performs the part of finish_scene() on models, skies, climate and layers.
 void finish_layers(const SectionReader& reader, Scene& scene);
 // Reports models that share a name, and names of models and skies that are not in the scene: also beside other problems, as

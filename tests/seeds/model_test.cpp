@@ -268,6 +268,8 @@ TEST(BaseModelCheck, NamesEveryBadValue) {
     refuse("billboards", [](BaseModel& m) { m.seeds[0].billboards = {5, 2}; });
     refuse("billboard width", [](BaseModel& m) { m.seeds[0].billboard_width_m = {50, 30}; });
     refuse("billboard height", [](BaseModel& m) { m.seeds[0].billboard_height_m = {-1, 30}; });
+    refuse("billboard width", [](BaseModel& m) { m.seeds[0].billboard_width_m = {30, 60'001}; });
+    refuse("billboard height", [](BaseModel& m) { m.seeds[0].billboard_height_m = {1e-300, 30}; });
     refuse("strength", [](BaseModel& m) { m.seeds[0].strength = 2; });
     refuse("reproductions", [](BaseModel& m) { m.seeds[0].roots[1].reproductions = {3, 2}; });
     refuse("seeds start", [](BaseModel& m) { m.seeds[0].roots[0].seeds_start = -1; });
