@@ -151,12 +151,14 @@ constexpr std::string_view kNoThread =
 // Returns whether this thread may tell why the program ends: one of several that end it at once does, and the others wait, as long
 // as that may take.
 bool may_tell() {
-    static std::atomic_flag is_told;
-    for (int tenths_s = 0; is_told.test_and_set(); ++tenths_s) {
-        if (tenths_s == 50) return false;
+    static std::atomic<pid_t> teller = 0;
+    const pid_t own = ::gettid();
+    for (int tenths_s = 0; tenths_s < 50; ++tenths_s) {
+        pid_t before = 0;
+        if (teller.compare_exchange_strong(before, own) || before == own) return true;
         ::usleep(100'000);
     }
-    return true;
+    return false;
 }
 
 // Tells the exception that is being handled, and returns the exit status for it.

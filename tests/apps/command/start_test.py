@@ -8,10 +8,27 @@ import shutil
 import subprocess
 import unittest
 
-from case import NEPHOS, PATIENCE, Case
+from case import NEPHOS, PATIENCE, SANITIZED, Case
 
 # Libraries whose symbols take most of the time of a short run.
 SLOW = ("libopenvdb", "libOpenEXR", "libblosc", "libboost_iostreams", "liblog4cplus")
+
+# From allocation FIRST on each fails.
+NO_MEMORY = """\
+#include <errno.h>
+#include <stdlib.h>
+extern void *__libc_malloc(size_t), *__libc_calloc(size_t, size_t), *__libc_realloc(void *, size_t);
+static int fails(void) {
+    static long number, first;
+    if (first == 0) first = atol(getenv("FIRST"));
+    if (__sync_add_and_fetch(&number, 1) < first) return 0;
+    errno = ENOMEM;
+    return 1;
+}
+void *malloc(size_t size) { return fails() ? 0 : __libc_malloc(size); }
+void *calloc(size_t count, size_t size) { return fails() ? 0 : __libc_calloc(count, size); }
+void *realloc(void *old, size_t size) { return fails() ? 0 : __libc_realloc(old, size); }
+"""
 
 
 def become(user, processes):
@@ -95,6 +112,20 @@ class Start(Case):
             if result.returncode != 0:
                 self.assertRegex(result.stderr, "^error: a part of nephos cannot be loaded: it needs 6 threads")
         self.assertEqual(statuses, {0, 3})
+
+    @unittest.skipIf(SANITIZED, "a sanitizer has its own allocator")
+    def test_without_any_memory_that_is_told(self):
+        """From one allocation on each fails, also those that a message takes."""
+        source = self.write("memory.c", NO_MEMORY)
+        subprocess.run([os.environ.get("CC", "cc"), "-shared", "-fPIC", "-w", "-o", self.folder / "memory.so", source], check=True)
+        ended = []
+        for first in range(1000, 6000, 61):
+            result = subprocess.run([NEPHOS, "hash", self.scene, "-n", "1"], cwd=self.folder, capture_output=True, text=True, timeout=PATIENCE,
+                                    env=self.environment | {"LD_PRELOAD": "./memory.so", "FIRST": str(first)})
+            if result.returncode == 3:
+                self.assertEqual(result.stderr, "error: out of memory\n", first)
+            ended.append(result.returncode)
+        self.assertGreater(ended.count(3), 10)
 
     @unittest.skipIf(os.geteuid() != 0, "needs another user")
     def test_without_threads_nothing_aborts(self):
