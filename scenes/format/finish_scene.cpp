@@ -53,6 +53,13 @@ void check_wind_speed(const SectionReader& reader, const Scene& scene) {
                       " cells: a shorter `time.step_s`, a larger `lattice.cell_size_m` or less wind");
 }
 
+// Returns the key of the horizontal semi-axis that adds more to the reach of a scatter's ellipsoids along an axis of the lattice.
+std::string_view longer_along(const EllipsoidScatter& scatter, int axis) {
+    EllipsoidScatter of_x = scatter, of_y = scatter;
+    of_x.semi_axis_y_m = of_y.semi_axis_x_m = {0, 0};
+    return reach_m(of_x)[axis] >= reach_m(of_y)[axis] ? "semi_axis_x_m" : "semi_axis_y_m";
+}
+
 void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
     if (!reader.sound({"lattice", "field"})) return;
     const AutomatonOptions& o = scene.automaton;
@@ -139,10 +146,17 @@ void check_reach_of_ellipsoids(const SectionReader& owner, std::span<const Ellip
         check_periodic_reach(item, {}, largest_m, reach_m(ellipsoids[n]), "semi_axes_m", "semi_axes_m");
     });
     check_items("scatters", [&](std::size_t n, const SectionReader& item) {
-        const EllipsoidScatter& s = scatters[n];
-        const bool longer = s.semi_axis_x_m.max >= s.semi_axis_y_m.max;
-        const char* const horizontal = longer ? "semi_axis_x_m" : "semi_axis_y_m";
-        check_periodic_reach(item, {}, largest_m, reach_m(s), horizontal, "semi_axis_z_m");
+        EllipsoidScatter as_drawn = scatters[n];
+        as_drawn.thermals.spread = 0;
+        const Vec3 reach = reach_m(as_drawn);
+        const auto exceeds = [&](const Vec3& of, int axis) { return of[axis] > largest_m[axis]; };
+        if (exceeds(reach, 0) || exceeds(reach, 1) || exceeds(reach, 2)) {
+            check_periodic_reach(item, {}, largest_m, reach,
+                                 longer_along(as_drawn, exceeds(reach, 0) ? 0 : 1), "semi_axis_z_m");
+        } else {
+            check_periodic_reach(item, "a thermal, grown by " + item.quoted("thermals") + ",", largest_m,
+                                 reach_m(scatters[n]), "thermals", "thermals");
+        }
     });
 }
 
