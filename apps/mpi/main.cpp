@@ -79,7 +79,8 @@ void simulate(const Arguments& a) {
         throw Error(
             ErrorCode::usage,
             a.scene +
-                ": has a `wind_field` that differs from place to place: expected a wind that is the same all "
+                ": has a `wind_field` that differs within a level or rises: expected a horizontal wind that "
+                "is the same all "
                 "over a level, or `nephos run` or `nephos hash`, which step all of a lattice in one process");
     AutomatonOptions options = scene.automaton;
     if (a.seed) options.seed = *a.seed;
@@ -126,9 +127,9 @@ void add_options(CLI::App& app, Arguments& a) {
     app.set_help_flag("-h,--help", "This page")->group("General");
     app.set_version_flag("-V,--version", fmt::format("nephos {}", version()), "Version of nephos")
         ->group("General");
-    app.add_option(
-           "SCENE", a.scene,
-           "Scene of one lattice, without layers, `initial_state` and winds that differ within a level")
+    app.add_option("SCENE", a.scene,
+                   "Scene of one lattice, without layers, `initial_state` and winds that differ within a "
+                   "level or rise")
         ->required();
     app.add_option("--set", a.settings, "Change a key of the scene; may be repeated")
         ->type_name("KEY=VALUE")
