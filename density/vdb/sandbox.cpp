@@ -368,7 +368,14 @@ void attempt(std::string_view parser, const SandboxLimits& limits, std::span<con
     if (pid < 0)
         throw std::runtime_error(std::string(kCannotRead) +
                                  "no process to read it in: " + std::strerror(errno));
-    if (pid == 0) run_child(self, ends[1], limits, kept, child);
+    if (pid == 0) {
+        try {
+            run_child(self, ends[1], limits, kept, child);
+        } catch (
+            ...) {  // no memory for the message; what called this is the parent's, and not to be gone back through
+            ::_exit(1);
+        }
+    }
     in.close();
     Child process(pid, parser);
     PipeReader reader(out.get(), pid, limits, time, last_attempt);

@@ -10,6 +10,7 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdlib>
+#include <new>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -153,6 +154,21 @@ TEST(Sandbox, StartsAnewWhereNothingComes) {
     }
     EXPECT_EQ(message, "s: cannot read: it takes longer than allowed");
     EXPECT_EQ(told, 1);
+}
+
+// Checks that a child which lacks memory for its last word ends where it is: else it would go back through this test.
+TEST(Sandbox, ChildWithoutAnyMemoryEnds) {
+    if (NEPHOS_SANITIZED) GTEST_SKIP() << "a sanitizer's allocator ends the process";
+    const auto greedy = [](SandboxWriter&) {
+        void* volatile kept = nullptr;
+        for (std::size_t size = 1 << 20; size >= 8; size /= 2) {
+            do kept = std::malloc(size);
+            while (kept != nullptr);
+        }
+        throw std::bad_alloc();
+    };
+    EXPECT_EQ(error_of(greedy, {.memory_bytes = std::size_t(64) << 20}),
+              "subject.vdb: cannot read: OpenVDB ended: the file is damaged, or memory is short");
 }
 
 // Checks that a thread which this process cannot start, while it takes what was read, is not told as a fault of the file.
