@@ -183,6 +183,8 @@ int report_exception() {
     }
 }
 
+int told_status = -1;  // the exit status, once its reason has been told
+
 // The only place where exceptions end.
 int guarded(int argc, const char* const* argv, const EditFunction& edit) {
     CLI::App app;
@@ -194,7 +196,8 @@ int guarded(int argc, const char* const* argv, const EditFunction& edit) {
         return 0;
     } catch (const std::exception&) {
         may_tell();  // or another thread has ended the program
-        return report_exception();
+        told_status = report_exception();
+        return told_status;
     }
 }
 
@@ -216,6 +219,7 @@ std::terminate_handler ends_otherwise = nullptr;
     }
     if (!told.empty() && ::getpid() == program) {
         if (may_tell()) {
+            if (told_status >= 0) ::_exit(told_status);  // a library's, at the program's end
             char line[256];  // in one piece, and without memory
             const auto end = fmt::format_to_n(line, sizeof line, "error: {}\n", told).out;
             [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, line, std::size_t(end - line));
