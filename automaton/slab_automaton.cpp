@@ -143,7 +143,8 @@ SlabAutomaton::SlabAutomaton(const AutomatonOptions& options, int first, int end
     check(options);
     if (!is_profile(options.wind.fields))
         throw Error(ErrorCode::usage,
-                    "the wind differs within a level or rises: expected a horizontal one that is the same "
+                    "the wind differs within a level or has a vertical part: expected a horizontal one that "
+                    "is the same "
                     "all over a level");
     if (first < 0 || end > options.extent.z || first >= end || first % kBlockEdge != 0 ||
         (end % kBlockEdge != 0 && end != options.extent.z))

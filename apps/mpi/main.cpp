@@ -79,7 +79,8 @@ void simulate(const Arguments& a) {
         throw Error(
             ErrorCode::usage,
             a.scene +
-                ": has a `wind_field` that differs within a level or rises: expected a horizontal wind that "
+                ": has a `wind_field` that differs within a level or has a vertical part: expected a "
+                "horizontal wind that "
                 "is the same all "
                 "over a level, or `nephos run` or `nephos hash`, which step all of a lattice in one process");
     AutomatonOptions options = scene.automaton;

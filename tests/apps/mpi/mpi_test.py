@@ -163,7 +163,7 @@ class Ranks(Mpi):
         for processes in (1, 3):
             self.assertEqual(self.mpirun(processes, "profile-of-file.toml", "--hash").stdout, expected)
         for processes in (1, 2):
-            self.assertIn("vortex-of-file.toml: has a `wind_field` that differs within a level or rises",
+            self.assertIn("vortex-of-file.toml: has a `wind_field` that differs within a level or has a vertical part",
                           self.mpirun(processes, "vortex-of-file.toml", status=2).stderr)
 
     def test_statistics_and_bits_are_those_of_one_process(self):
