@@ -123,7 +123,7 @@ class Start(Case):
             result = subprocess.run([NEPHOS, "hash", self.scene, "-n", "1"], cwd=self.folder, capture_output=True, text=True, timeout=PATIENCE,
                                     env=self.environment | {"LD_PRELOAD": "./memory.so", "FIRST": str(first)})
             if result.returncode == 3:
-                self.assertEqual(result.stderr, "error: out of memory\n", first)
+                self.assertIn("error: out of memory\n", result.stderr, first)  # libraries may have words of their own
             ended.append(result.returncode)
         self.assertGreater(ended.count(3), 10)
 
