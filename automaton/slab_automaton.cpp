@@ -144,8 +144,7 @@ SlabAutomaton::SlabAutomaton(const AutomatonOptions& options, int first, int end
     if (!is_profile(options.wind.fields))
         throw Error(ErrorCode::usage,
                     "the wind differs within a level or has a vertical part: expected a horizontal one that "
-                    "is the same "
-                    "all over a level");
+                    "is the same all over a level");
     if (first < 0 || end > options.extent.z || first >= end || first % kBlockEdge != 0 ||
         (end % kBlockEdge != 0 && end != options.extent.z))
         throw Error(ErrorCode::usage, "a slab of levels " + std::to_string(first) + " to " +

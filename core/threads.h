@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How this process tells that there is no room for a thread.
+// Tells a lack of threads from other failures.
 
 #include <exception>
 

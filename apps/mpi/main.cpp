@@ -80,9 +80,8 @@ void simulate(const Arguments& a) {
             ErrorCode::usage,
             a.scene +
                 ": has a `wind_field` that differs within a level or has a vertical part: expected a "
-                "horizontal wind that "
-                "is the same all "
-                "over a level, or `nephos run` or `nephos hash`, which step all of a lattice in one process");
+                "horizontal wind that is the same all over a level, or `nephos run` or `nephos hash`, which "
+                "step all of a lattice in one process");
     AutomatonOptions options = scene.automaton;
     if (a.seed) options.seed = *a.seed;
     Ranks ranks(options);
@@ -130,7 +129,7 @@ void add_options(CLI::App& app, Arguments& a) {
         ->group("General");
     app.add_option("SCENE", a.scene,
                    "Scene of one lattice, without layers, `initial_state` and winds that differ within a "
-                   "level or rise")
+                   "level or have a vertical part")
         ->required();
     app.add_option("--set", a.settings, "Change a key of the scene; may be repeated")
         ->type_name("KEY=VALUE")

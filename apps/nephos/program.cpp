@@ -148,8 +148,8 @@ constexpr std::string_view kNoThread =
     "cannot start another thread: expected a higher limit of processes or addresses (`ulimit -a`), or fewer "
     "threads (-j 1)";
 
-// Returns whether this thread may tell why the program ends: one of several that end it at once does, and the others wait, as long
-// as that may take.
+// Returns whether this thread may tell why the program ends: one of several that end it at once does, and the others wait for that,
+// five seconds at most.
 bool may_tell() {
     static std::atomic<pid_t> teller = 0;
     const pid_t own = ::gettid();

@@ -369,10 +369,10 @@ void attempt(std::string_view parser, const SandboxLimits& limits, std::span<con
         throw std::runtime_error(std::string(kCannotRead) +
                                  "no process to read it in: " + std::strerror(errno));
     if (pid == 0) {
+        // Ends it here where there is no memory for its last word: what called this is the parent's, and not to be gone back through.
         try {
             run_child(self, ends[1], limits, kept, child);
-        } catch (
-            ...) {  // no memory for the message; what called this is the parent's, and not to be gone back through
+        } catch (...) {
             ::_exit(1);
         }
     }

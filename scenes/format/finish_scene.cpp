@@ -149,10 +149,10 @@ void check_reach_of_ellipsoids(const SectionReader& owner, std::span<const Ellip
         EllipsoidScatter as_drawn = scatters[n];
         as_drawn.thermals.spread = 0;
         const Vec3 reach = reach_m(as_drawn);
-        const auto exceeds = [&](const Vec3& of, int axis) { return of[axis] > largest_m[axis]; };
-        if (exceeds(reach, 0) || exceeds(reach, 1) || exceeds(reach, 2)) {
-            check_periodic_reach(item, {}, largest_m, reach,
-                                 longer_along(as_drawn, exceeds(reach, 0) ? 0 : 1), "semi_axis_z_m");
+        const auto exceeds = [&](int axis) { return reach[axis] > largest_m[axis]; };
+        if (exceeds(0) || exceeds(1) || exceeds(2)) {
+            check_periodic_reach(item, {}, largest_m, reach, longer_along(as_drawn, exceeds(0) ? 0 : 1),
+                                 "semi_axis_z_m");
         } else {
             check_periodic_reach(item, "a thermal, grown by " + item.quoted("thermals") + ",", largest_m,
                                  reach_m(scatters[n]), "thermals", "thermals");

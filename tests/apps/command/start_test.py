@@ -147,10 +147,10 @@ class Start(Case):
         """Whatever the limit of processes and of `-j`, a command ends: oneTBB would wait for ever for what comes too late."""
         os.chmod(self.folder, 0o777)
         threads = len(os.sched_getaffinity(0))
-        for n, most in enumerate((1, threads - 1, threads + 1, 60 + 4 * threads)):
+        for n, most in enumerate((1, max(1, threads - 1), threads + 1, 60 + 4 * threads)):
             for call in range(20):
                 result = subprocess.run([NEPHOS, "hash", self.scene, "-n", "1", "-j", str(threads * (1 + call % 2))], cwd=self.folder, env=self.environment,
-                                        capture_output=True, text=True, timeout=PATIENCE, preexec_fn=lambda: become(41235 + 20 * n + call, max(1, most)))
+                                        capture_output=True, text=True, timeout=PATIENCE, preexec_fn=lambda: become(41235 + 20 * n + call, most))
                 self.assertEqual(result.returncode, 0 if most >= threads else 3, result.stderr)
                 self.assertEqual(result.stderr.count("cannot start another thread"), 1 if most < threads else 0, result.stderr)
 
